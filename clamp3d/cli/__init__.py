@@ -17,7 +17,7 @@ from contextlib import suppress
 import click
 
 import clamp3d
-from clamp3d.cli.terminal import ExitCode, end_on_signals, show, tolerate_closed_pipes
+from clamp3d.cli.terminal import ExitCode, end_on_signals, prepare_streams, show
 from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
 # Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
@@ -83,7 +83,7 @@ def group(context: click.Context) -> None:
 
 def main() -> None:
     """Entry point: one line for every fault, never a traceback; CLAMP3D_DEBUG=1 shows it."""
-    tolerate_closed_pipes()
+    prepare_streams()
     end_on_signals()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads only cost time to start
     try:
@@ -97,40 +97,54 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("CLAMP3D_DEBUG"):
             traceback.print_exc()
-        status = _fail(*_explained(error))
+        message, status = _explained(error)
+        _complain(message)
+    sys.exit(_flushed(int(status) if isinstance(status, int) else ExitCode.CLEAN))
+
+
+def _flushed(status: int) -> int:
+    """The exit code when what is still in the buffers is written: a full disk is bad input, unless worse is known."""
     for stream in (sys.stdout, sys.stderr):
         try:
-            if stream is not None:
-                stream.flush()
-        except OSError as error:  # a full disk: what is left in the buffer would be tried once more at exit
-            if stream is sys.stdout and status not in (ExitCode.BAD_INPUT, ExitCode.FAILED):
-                status = _fail(f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT)
-            with suppress(OSError):
+            stream.flush()
+        except OSError as error:
+            is_reported = isinstance(error, BrokenPipeError) or status in (ExitCode.BAD_INPUT, ExitCode.FAILED)
+            if stream is sys.stdout and not is_reported:
+                _complain(f"cannot write to stdout: {error.strerror}")
+                status = ExitCode.BAD_INPUT
+            with suppress(OSError):  # what is left in the buffer would be tried once more at exit
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-    sys.exit(int(status) if isinstance(status, int) else 0)
+    return status
 
 
 def _explained(error: Exception) -> tuple[str, ExitCode]:
     """An error in one line, and its exit code."""
-    from clamp3d.checks import short
-
-    if isinstance(error, click.ClickException):
-        context = getattr(error, "ctx", None)
-        hint = f" (see {context.command_path} --help)" if context is not None else ""
-        return error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT
     if isinstance(error, ModuleNotFoundError) and (library := str(error.name).partition(".")[0]) in EXTRAS:
         error = missing(library, "this")
-    if isinstance(error, (NotClampedError, SequenceError)):
-        return str(error), ExitCode.FINDING
-    if isinstance(error, SolverError):
-        return str(error), ExitCode.FAILED
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{short(error.filename)}: {error.strerror}", ExitCode.BAD_INPUT
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG):
-        return f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT
-    if isinstance(error, (Clamp3dError, OSError)):
-        return str(error), ExitCode.BAD_INPUT
-    return f"inside clamp3d: {_place(error)}; CLAMP3D_DEBUG=1 shows the traceback", ExitCode.FAILED
+    match error:
+        case click.ClickException():
+            context = getattr(error, "ctx", None)
+            hint = "" if context is None else f" (see {context.command_path} --help)"
+            return error.format_message().replace("\n", " ") + hint, ExitCode.BAD_INPUT
+        case NotClampedError() | SequenceError():
+            return str(error), ExitCode.FINDING
+        case SolverError():
+            return str(error), ExitCode.FAILED
+        case Clamp3dError():
+            return str(error), ExitCode.BAD_INPUT
+        case OSError(errno=errno.ENOSPC | errno.EFBIG, filename=None):
+            return f"cannot write to stdout: {error.strerror}", ExitCode.BAD_INPUT
+        case OSError():
+            return f"{error.filename or 'stdout'}: {error.strerror}", ExitCode.BAD_INPUT
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "clamp3d" in f.filename]
+    where = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
+    message = f"inside clamp3d: {type(error).__name__}: {error}{where}; CLAMP3D_DEBUG=1 shows the traceback"
+    return message, ExitCode.FAILED
+
+
+def _complain(message: str) -> None:
+    with suppress(OSError):  # a full disk: the exit code is still right
+        print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
 
 
 def _check_environment() -> None:
@@ -141,16 +155,3 @@ def _check_environment() -> None:
         from clamp3d.output.pages import now
 
         now()
-
-
-def _place(error: Exception) -> str:
-    """Type and message of an unexpected error, and the line of this package that it came through last."""
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if "clamp3d" in f.filename]
-    where = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
-    return f"{type(error).__name__}: {error}{where}"
-
-
-def _fail(message: str, code: ExitCode) -> ExitCode:
-    with suppress(OSError):  # a full disk: the exit code is still right
-        print(f"clamp3d: error: {one_line(message)}", file=sys.stderr)
-    return code

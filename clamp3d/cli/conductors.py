@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 
-import click
-
 from clamp3d.cli.options import declared, option
+from clamp3d.cli.terminal import show
 
 
 @declared("conductors")
@@ -19,7 +18,7 @@ def command(
     from clamp3d.clamp.conductors import catalogue
 
     if as_json:
-        click.echo(json.dumps([asdict(entry) for entry in catalogue().values()], indent=2))
+        show(json.dumps([asdict(entry) for entry in catalogue().values()], indent=2))
         return
     for entry in catalogue().values():
-        click.echo(f"{entry.designation:12s} {entry.diameter:7.2f} mm   {entry.standard}")
+        show(f"{entry.designation:12s} {entry.diameter:7.2f} mm   {entry.standard}")

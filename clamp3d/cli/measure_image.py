@@ -6,15 +6,27 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import INPUT_FILE, JSON, argument, declared, option
+from clamp3d.cli.options import INPUT_FILE, JSON, argument, declared, number, option
 from clamp3d.cli.terminal import save, show
+
+
+def two_points(text: str) -> list[tuple[float, float]]:
+    """Two positions in px, as the type of an option."""
+    pairs = [pair.split(",") for pair in text.replace(";", " ").split()]
+    if [len(pair) for pair in pairs] != [2, 2]:
+        raise click.BadParameter(f"must be two positions 'X,Y X,Y' in px, got {text!r}")
+    return [(number(x), number(y)) for x, y in pairs]
 
 
 @declared("measure-image")
 def command(
     image: Path = argument(type=INPUT_FILE),
-    points: str = option("The two end points in px from the top left.", required=True, metavar="'X,Y X,Y'"),
-    reference: str = option("The two ends of a measured length, in px.", required=True, metavar="'X,Y X,Y'"),
+    points: list[tuple[float, float]] = option(
+        "The two end points in px from the top left.", type=two_points, required=True, metavar="'X,Y X,Y'"
+    ),
+    reference: list[tuple[float, float]] = option(
+        "The two ends of a measured length, in px.", type=two_points, required=True, metavar="'X,Y X,Y'"
+    ),
     scale: float = option("That length, by calliper.", required=True, metavar="MM"),
     kind: str = option(
         "Square to the reference line, or straight from point to point.",
@@ -40,7 +52,7 @@ def command(
     from clamp3d.bench.image import MARKING_ERROR, Kind, measure_image
     from clamp3d.bench.picture import check_marks, load_image, snap_marks
 
-    marks = np.array(_marks("--points", points) + _marks("--reference", reference))
+    marks = np.array(points + reference)
     shown = load_image(image)
     marks = check_marks(shown, marks) if snap is None else snap_marks(shown, marks, snap)
     if marking_error is None:
@@ -61,14 +73,3 @@ def command(
     show(f"marks        {', '.join(f'({x:.2f}, {y:.2f})' for x, y in marks)}")
     data = {"image": str(image), "kind": kind, "marks": marks.tolist(), **asdict(measured)}
     save(json_file, lambda: data)
-
-
-def _marks(option: str, text: str) -> list[tuple[float, float]]:
-    """Two positions from "X,Y X,Y". Raises click.UsageError."""
-    try:
-        pairs = [tuple(float(v) for v in pair.split(",")) for pair in text.replace(";", " ").split()]
-    except ValueError:
-        pairs = []
-    if [len(pair) for pair in pairs] != [2, 2]:
-        raise click.UsageError(f"{option} must be two positions 'X,Y X,Y' in px, got {text!r}")
-    return [(pair[0], pair[1]) for pair in pairs]

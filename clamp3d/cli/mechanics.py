@@ -36,23 +36,19 @@ class Mechanics:
         metavar="MU,...",
     )
 
-    def check(self, solver: str) -> None:
-        """Raise click.UsageError for options that do not go together, InputError for a value that breaks its rule."""
-        from clamp3d.clamp.torque import check_torque, coefficients
+    def __bool__(self) -> bool:
+        return any(value is not None for value in vars(self).values())
 
+    def check(self, solver: str) -> None:
+        """Raise click.UsageError for options that do not go together."""
         if self.friction is not None and self.torque is None:
             raise click.UsageError("--friction goes with --torque")
-        if self != Mechanics(None, None, None, None) and solver != "exact":
+        if self and solver != "exact":
             raise click.UsageError(f"--torque, --measured and --groove-friction go with --solver exact, not {solver}")
-        if self.torque is not None:
-            check_torque(self.torque)
-        for name, values in (("friction", self.friction), ("groove friction", self.groove_friction)):
-            if values is not None:
-                coefficients(name, values)
 
     def answer(self, run: Assembly) -> tuple[str, dict[str, Any]]:
         """Text and data for JSON of an assembled clamp; nothing if nothing was asked for."""
-        if self == Mechanics(None, None, None, None):
+        if not self:
             return "", {}
         if not run.clamped:
             return f"torque and friction: not computed, {run.status}", {}

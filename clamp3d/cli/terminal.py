@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NoReturn
@@ -34,19 +35,19 @@ def show(text: str, *, err: bool = False) -> None:
     """
     context = click.get_current_context(silent=True)
     taken = context is not None and STDOUT_TAKEN in context.meta
-    click.echo(escaped(text, keep="\n"), err=err or taken)
+    with suppress(BrokenPipeError):  # `| head`: the exit code is the verdict's all the same
+        click.echo(escaped(text, keep="\n"), err=err or taken)
 
 
 def save(path: Path | None, make: Callable[[], dict[str, Any] | str]) -> None:
     """Write what ``make`` gives to a file, if there is to be one: a text as it is, anything else as JSON."""
-    if path is not None:
-        from clamp3d.output.files import write_json, write_text
+    if path is None:
+        return
+    from clamp3d.output.files import write_json, write_text
 
-        content = make()
-        if isinstance(content, str):
-            write_text(path, content)
-        else:
-            write_json(path, content)
+    content = make()
+    with suppress(BrokenPipeError):
+        write_text(path, content) if isinstance(content, str) else write_json(path, content)
 
 
 def finish(finding: bool = False, *, failed: bool = False, verdicts: Collection[str] = ()) -> None:
@@ -75,7 +76,6 @@ def end_on_signals() -> None:
     """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
 
     def end(number: int, frame: object) -> NoReturn:
-        signal.signal(number, signal.SIG_DFL)  # the second one ends it at once
         raise SystemExit(128 + number)
 
     for name in ("SIGTERM", "SIGHUP"):
@@ -84,25 +84,11 @@ def end_on_signals() -> None:
             signal.signal(number, end)
 
 
-class _Tolerant(io.FileIO):
-    """A file descriptor whose reader may go away: what is written from then on is lost, which is no error."""
-
-    def write(self, data: object) -> int:
-        try:
-            return super().write(data)  # type: ignore[arg-type]
-        except BrokenPipeError:
-            return memoryview(data).nbytes  # type: ignore[arg-type]
-
-
-def tolerate_closed_pipes() -> None:
-    """Let ``clamp3d ... | head`` keep the exit code of its verdict. Streams that a test put in place stay."""
+def prepare_streams() -> None:
+    """Letters that a terminal lacks become escape sequences; a stream that the caller has closed takes anything."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed by the caller: libraries ask it whether it is a terminal
+        if stream is None:  # libraries ask it whether it is a terminal
             setattr(sys, name, io.TextIOWrapper(io.FileIO(os.devnull, "w"), encoding="utf-8"))
-        elif stream is getattr(sys, f"__{name}__"):
-            raw = io.BufferedWriter(_Tolerant(stream.fileno(), "wb", closefd=False))
-            wrapped = io.TextIOWrapper(
-                raw, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering or name == "stderr"
-            )
-            setattr(sys, name, wrapped)
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

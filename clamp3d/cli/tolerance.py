@@ -45,7 +45,8 @@ def command(
     from clamp3d.clamp.tolerance import monte_carlo
     from clamp3d.cli.progress import bar
     from clamp3d.errors import NotClampedError, SolverError
-    from clamp3d.output.tolerance_report import draw_histogram, tolerance_to_dict, tolerance_to_text
+    from clamp3d.output.figures import save_figure
+    from clamp3d.output.tolerance_report import histogram_figure, tolerance_to_dict, tolerance_to_text
 
     loaded = source.clamp()
     note = ""
@@ -68,5 +69,5 @@ def command(
     show(tolerance_to_text(result, rows, note))
     save(json_file, lambda: tolerance_to_dict(result, rows))
     if plot_file is not None:
-        draw_histogram(plot_file, result)
+        save_figure(histogram_figure(result), plot_file)
     finish(result.nominal is None, failed=bool(result.unproven))

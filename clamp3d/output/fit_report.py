@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -66,24 +65,22 @@ def fit_to_html(result: FitResult) -> str:
     V, F = result.mesh.vertices, result.mesh.faces
     features = result.features[:_DRAWN]
     owner = np.zeros(len(F), dtype=np.uint8)
-    turns = {family: count() for family in COLOURS}
-    colours, axes = [], []
     for number, f in enumerate(features, start=1):
         owner[f.faces] = number
-        palette = COLOURS[f.name[0]]
-        colours.append(palette[next(turns[f.name[0]]) % len(palette)])
-        half = (0.5 * f.length + 0.15 * f.radius) * f.T_part_feature[:3, 2]
-        axes.append([f.T_part_feature[:3, 3] - half, f.T_part_feature[:3, 3] + half])
+    colours = [COLOURS[f.name[0]][(int(f.name[1:]) - 1) % 4] for f in features]
     low, high = V[np.unique(F)].min(axis=0), V[np.unique(F)].max(axis=0)
     middle = 0.5 * (low + high)
+    halves = [(0.5 * f.length + 0.15 * f.radius) * f.T_part_feature[:3, 2] for f in features]
+    centres = [f.T_part_feature[:3, 3] - middle for f in features]
+    axes = np.array([(c - h, c + h) for c, h in zip(centres, halves, strict=True)]).reshape(-1, 2, 3)
     data: dict[str, Any] = {
         "positions": _base64((V[F] - middle).astype("<f4")),
         "owner": _base64(owner),
-        "size": 2.0 * max(float(np.linalg.norm(p - middle)) for p in (low, *(q for axis in axes for q in axis))),
+        "size": 2.0 * float(np.linalg.norm(np.vstack([low - middle, *axes]), axis=1).max()),
         # A groove's mouth is its +y: look at the side that most of the grooves open to.
         "from_below": sum(float(g.T_part_feature[2, 1]) for g in result.grooves) < -0.1,
         "colours": colours,
-        "axes": [[(q - middle).tolist() for q in axis] for axis in axes],
+        "axes": axes.tolist(),
     }
     return render(
         "fit.html",

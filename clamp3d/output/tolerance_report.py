@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
 from clamp3d.clamp.sensitivity import DIMENSIONS, Sensitivity
 from clamp3d.clamp.tolerance import MonteCarlo
-from clamp3d.output.figures import blank, save_figure
+from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK
 from clamp3d.output.tables import text_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PERCENTILES = (0.1, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 99.9)
 _SHARE = {"uniform": 1.0 / 3.0, "normal": 1.0 / 9.0}  # variance by the square of the tolerance
@@ -84,40 +87,30 @@ def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict
     }
 
 
-def draw_histogram(path: Path, result: MonteCarlo) -> None:
-    """Write the histogram as PNG, SVG or PDF by the file's name; nominal, median, 5 and 95 % are marked and named."""
+def histogram_figure(result: MonteCarlo) -> Figure:
+    """The histogram of the splint distances; nominal, median, 5 and 95 % are marked and named."""
     figure = blank(7.5, 4.4)
     axes = figure.add_subplot()
     n, m = len(result.status), len(result.clamped)
     if m:
         axes.hist(result.clamped, bins=min(80, max(5, round(2.0 * m ** (1 / 3)))), color="#56B4E9", edgecolor="white")
         axes.set_ylim(0.0, 1.22 * axes.get_ylim()[1])
-        marks: list[tuple[str, float, Any]] = [
-            ("median" if p == 50.0 else f"{p:g} % below", v, (0, (4, 3)))
-            for p, v in zip((5.0, 50.0, 95.0), result.percentiles((5, 50, 95)), strict=True)
-        ]
+        low, median, high = result.percentiles((5.0, 50.0, 95.0))
+        for name, value in (("5 % below", low), ("median", median), ("95 % below", high)):
+            axes.axvline(value, color=INK, linestyle=(0, (4, 3)), linewidth=1.3)
+            _name(axes, f"{name} {value:.3f}", value, 0.88, 4, "left")
         if result.nominal is not None:
-            marks.append(("nominal", result.nominal, "-"))
-        for name, value, style in marks:
-            upper = name == "nominal"
-            axes.axvline(value, color="#D55E00" if upper else INK, linestyle=style, linewidth=1.3)
-            axes.annotate(
-                f"{name} {value:.3f}",
-                (value, 0.95 if upper else 0.88),
-                xycoords=("data", "axes fraction"),
-                xytext=(-4 if upper else 4, 0),
-                ha="right" if upper else "left",
-                textcoords="offset points",
-                fontsize=8,
-                color=INK,
-            )
+            axes.axvline(result.nominal, color="#D55E00", linewidth=1.3)
+            _name(axes, f"nominal {result.nominal:.3f}", result.nominal, 0.95, -4, "right")
     else:
         axes.text(0.5, 0.5, "no sample clamps", transform=axes.transAxes, ha="center")
-    axes.set_xlabel("splint distance (mm)")
-    axes.set_ylabel("clamps")
+    axes.set(xlabel="splint distance (mm)", ylabel="clamps")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set_title(
-        f"{result.spec.clamp.name}: {n} clamps within tolerances, {n - m} not clamped (seed {result.spec.seed})",
-        fontsize=10,
-    )
-    save_figure(figure, path)
+    heading = f"{result.spec.clamp.name}: {n} clamps within tolerances, {n - m} not clamped (seed {result.spec.seed})"
+    axes.set_title(heading, fontsize=10)
+    return figure
+
+
+def _name(axes: Axes, text: str, x: float, height: float, offset: int, align: str) -> None:
+    place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": align}
+    axes.annotate(text, (x, height), (offset, 0), fontsize=8, color=INK, **place)

@@ -133,7 +133,7 @@ def test_the_command_measures_a_photograph(shown: Picture, tmp_path: Path) -> No
     for arguments, message in (
         ([str(tmp_path / "none.png"), *options], "No such file"),
         ([str(tmp_path / "text.png"), *options], "not a picture"),
-        ([str(file), *options[:1], "1,2 3", *options[2:]], "--points must be two positions"),
+        ([str(file), *options[:1], "1,2 3", *options[2:]], "must be two positions"),
         ([str(file), *options[:1], "1,2 30,99999", *options[2:]], "must lie in the picture, which is 637 x 754 px"),
     ):
         result = CliRunner().invoke(command, arguments)
