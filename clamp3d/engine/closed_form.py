@@ -7,8 +7,9 @@ the body the two agree, and the distance is exact; the body's outer faces are am
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,16 +17,12 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex, Rod, convex_distance
-from clamp3d.engine.hull import MEMBER, Hull
-from clamp3d.engine.nearest import segment_pairs, to_faces
-from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source, to_target
+from clamp3d.engine.hull import MEMBER
+from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.kernel.distance import SignedDistance, signed_distance
 
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
-_THIN = 1e-30
-_SHIFTS = 33
-"""Places along a cylinder's axis where a point of a line of contact is looked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,44 +87,26 @@ class ClosedForm:
 def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Distance], bool]) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; stops asking as soon as ``enough`` says so.
 
-    One question for each pair of pieces: grooves and holes with cylinders, convex pieces, grooves with polyhedra.
+    One question for each pair of pieces: grooves and holes with cylinders, then convex pieces.
     """
-    back, here = inverse(T), np.eye(4)
     error = a.error + b.error
-    found = Distance()
-    for kind in ("bore and cylinder", "convex", "bore and polyhedron"):
-        if kind == "convex":
-            for piece in a.outers:
-                for other in b.outers:
-                    for rims in (False, True):
-                        new = _convex(piece, other, a, b, here, T, rims)
-                        found = found.meet(new)
-                        if enough(found.widened(error)):
-                            return found.widened(error)
-                        if new.upper - new.lower <= 1e-10 or not (isinstance(piece, Rod) or isinstance(other, Rod)):
-                            break
-            continue
-        ask = _bore_rod if kind == "bore and cylinder" else _bore_hull
-        for first, second, swapped in ((a, b, False), (b, a, True)):
-            place = back if swapped else T
-            for bore in first.bores:
-                for piece in second.outers:
-                    if isinstance(piece, Rod) is not (ask is _bore_rod) or second.surface is not None:
-                        continue
-                    new = _with_witnesses(ask(bore, piece, place), first, second, place)
-                    found = found.meet(new.moved(T).swapped() if swapped else new)
-                    if enough(found.widened(error)):
-                        return found.widened(error)
-    return found.widened(error)
+    distance = Distance()
+    for new in _answers(a, b, T):
+        distance = distance.meet(new)
+        if enough(distance.widened(error)):
+            break
+    return distance.widened(error)
 
 
-def _convex(piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, here: Array, T: Array, rims: bool) -> Distance:
-    raw = convex_distance(piece, here, other, T, rims=rims)
-    new = _with_witnesses(raw, a, b, T)
-    expensive = a.surface is not None or b.surface is not None
-    if new.upper - raw.lower > 1e-10 and raw.normal is not None and (raw.lower > -0.01 or not expensive):
-        return new.meet(face_to_face(raw, piece, other, a, b, T))
-    return new
+def _answers(a: ClosedForm, b: ClosedForm, T: Array) -> Iterator[Distance]:
+    """Bounds of the distance of two bodies from each pair of their pieces."""
+    for first, second, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
+        rods = [piece for piece in second.outers if isinstance(piece, Rod)] if second.surface is None else []
+        for bore, rod in itertools.product(first.bores, rods):
+            new = _with_witnesses(bore_rod(bore, rod, place), (None, rod), first, second, place)
+            yield new.moved(T).swapped() if swapped else new
+    for piece, other in itertools.product(a.outers, b.outers):
+        yield _with_witnesses(convex_distance(piece, np.eye(4), other, T), (piece, other), a, b, T)
 
 
 def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
@@ -155,83 +134,55 @@ def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     return replace(found, lower=min(answer.distance - answer.error_bound for answer in answers))
 
 
-def _bore_rod(bore: Bore, piece: Convex, T: Array) -> Distance:
-    assert isinstance(piece, Rod)
-    return bore_rod(bore, piece, T)
+def _with_witnesses(
+    known: Distance, pieces: tuple[Convex | None, Convex], a: ClosedForm, b: ClosedForm, T: Array
+) -> Distance:
+    """``known`` of two ``pieces`` with its upper side kept only if points that both bodies have attest it.
 
-
-def _bore_hull(bore: Bore, piece: Convex, T: Array) -> Distance:
-    """A groove or hole and a polyhedron that lie apart.
-
-    The hollow side of the arc bends away from every flat face, so a nearest point lies on an edge of the polyhedron
-    (a thin capsule for the kernel), or on a lip or an end edge of the groove. That these lines all lie apart proves
-    that the bodies do: where a face alone cut the material, the cut would have a corner on one of them, or no end.
+    Apart, two points must lie on the bodies. Overlapping, a point that lies in both attests the depth it has in either.
+    A hole or the mouth of a groove may have taken the named points away, so others of the faces that look at each other
+    are tried too. ``T`` (4, 4) places b in a's frame, where the points are.
     """
-    assert isinstance(piece, Hull)
-    found = Distance(np.inf, np.inf)
-    corners, edges, triangles = (to_target(T, x) for x in piece.near(None))
-    if len(corners) > 64:
-        return Distance()
-    for groove, place in bore.covers():
-        R, t = place[:3, :3], place[:3, 3]
-        E, V = (edges - t) @ R, (corners - t) @ R
-        for start, end in E:
-            P = np.eye(4)
-            length = norm(end - start)
-            z = (end - start) / length
-            x = cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
-            P[:3, 2], P[:3, 0] = z, x / norm(x)
-            P[:3, 1], P[:3, 3] = cross(z, P[:3, 0]), 0.5 * (start + end)
-            answer = signed_distance(groove, Capsule(_THIN, length), P)
-            if answer.distance < found.upper:
-                found = kernel_distance(answer).moved(place)
-        s, h = groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)
-        H, far = 0.5 * groove.length, s + float(np.abs(V).max()) + groove.length
-        lines = [[(x, h, -H), (x, h, H)] for x in (-s, s)]
-        lines += [[(x, h, z), (math.copysign(far, x), h, z)] for x in (-s, s) for z in (-H, H)]
-        L = np.array(lines)
-        M = inverse(T) @ place
-        if any(piece.crossed_by(to_target(M, line)) for line in L):
-            return Distance()
-        for d, p, q in (segment_pairs(L, E), to_faces(L.reshape(-1, 3), (triangles - t) @ R)):
-            if 0.0 < d < found.upper:
-                e = 8.0 * 2.0**-52 * float(np.abs(V).max() + groove.radius + H)
-                n = (q - p) / d
-                found = Distance(d - e, d + e, p, q, n, None, "features", "groove kernel").moved(place)
-    return found if found.lower > 0.0 else Distance()
+    distance = replace(known, upper=math.inf, point_a=None, point_b=None)
+    if known.point_a is not None and known.point_b is not None:
+        attest = _on_both if known.upper >= 0.0 else _in_both
+        distance = attest(known, a, b, T, known.point_a[None], known.point_b[None])
+    expensive = a.surface is not None or b.surface is not None
+    if distance.upper - known.lower <= 1e-10 or known.normal is None or (expensive and known.lower < -0.01):
+        return distance
+    attest = _on_both if known.lower >= 0.0 else _in_both
+    return distance.meet(attest(known, a, b, T, *_facing(known.normal, known.lower, pieces, T)))
 
 
-def _with_witnesses(known: Distance, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
-    """``known`` with its upper side kept only if points that both bodies have attest it; ``T`` places b, points in a.
+def _facing(n: Array, gap: float, pieces: tuple[Convex | None, Convex], T: Array) -> tuple[Array, Array]:
+    """Points of the faces of two pieces that look at each other along ``n``, and those ``gap`` mm across (k, 3)."""
+    first, second = pieces
+    q = second.face(-n @ T[:3, :3]) @ T[:3, :3].T + T[:3, 3]
+    p = q - gap * n
+    if first is not None:
+        own = first.face(n)
+        p, q = np.vstack([own, p]), np.vstack([own + gap * n, q])
+    return p, q
 
-    Apart, the two witnesses must lie on the bodies. Overlapping, a point that lies in both attests the depth it has
-    in either; tried at the witnesses and between them.
-    """
-    p, q = known.point_a, known.point_b
-    if p is None or q is None:
+
+def _on_both(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
+    """``known`` with the first of the pairs ``p``, ``q`` (k, 3) that lie on the bodies, or without points."""
+    slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
+    depth = np.minimum(a.depth(p), b.depth(to_source(T, q)))
+    on_both = np.flatnonzero(depth >= -slack)
+    if not len(on_both):
         return replace(known, upper=math.inf, point_a=None, point_b=None)
-    # The two may be slid along a cylinder together: of a line of contact the named point may not be on the body.
-    lines = [_along(piece, None) for piece in a.outers] + [_along(piece, T) for piece in b.outers]
-    none = np.zeros((1, 3))
-    if known.upper >= 0.0:
-        first = _attested(known, a, b, T, p[None], q[None])
-        if first.upper < math.inf or not any(len(line) for line in lines):
-            return first
-        shifts = np.vstack(lines)
-        return _attested(known, a, b, T, p + shifts, q + shifts)
-    shifts = none if a.surface is not None or b.surface is not None else np.vstack([none, *lines])
-    trials = np.vstack([x + shifts for x in (p, q, 0.5 * (p + q))])
-    found = _deepest_common(known, a, b, T, trials)
-    kept = found.point_a is not None and np.array_equal(found.point_a, p)
-    if not kept or known.normal is None or found.upper > known.upper + MEMBER:
-        return found
-    # The piece's point q may be where a groove or a hole has taken the body away.
-    on_b = b.depth(to_source(T, q[None]))[0] >= -MEMBER * (1.0 + float(np.abs(q).max()))
-    return replace(found, point_a=p, point_b=q) if on_b else found
+    k = int(on_both[0])
+    outside = 4.0 * max(0.0, -float(depth[k])) if a.surface is None and b.surface is None else slack
+    return replace(known, upper=norm(q[k] - p[k]) + outside, point_a=p[k], point_b=q[k])
 
 
-def _deepest_common(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, trials: Array) -> Distance:
-    """``known`` with the deepest of ``trials`` (k, 3) that lie in both bodies as its witness, or without points."""
+def _in_both(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
+    """``known`` with the deepest point of the pairs ``p``, ``q`` (k, 3), and between them, that lies in both bodies.
+
+    Where that is one of ``p``, and ``q`` lies on the other body, the two are the pair of points.
+    """
+    trials = np.vstack([p, q, 0.5 * (p + q)])
     slack = MEMBER * (1.0 + float(np.abs(trials).max()))
     in_a, in_b = a.depth(trials), b.depth(to_source(T, trials))
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
@@ -240,47 +191,5 @@ def _deepest_common(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, tri
         return replace(known, upper=math.inf, point_a=None, point_b=None)
     outside = max(0.0, -float(min(in_a[k], in_b[k])))
     upper = max(known.lower, min(0.0, 4.0 * outside - float(both[k])))
-    return replace(known, upper=upper, point_a=trials[k], point_b=trials[k])
-
-
-def _attested(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
-    """``known`` with the first of the pairs ``p``, ``q`` (k, 3) that lie on the bodies, or without points.
-
-    What they are measured to lie outside is added; the cheap body is asked first.
-    """
-    slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
-    index, outside = np.arange(len(p)), np.zeros(len(p))
-    tests = [(a, p), (b, to_source(T, q))]
-    for body, points in sorted(tests, key=lambda test: test[0].surface is not None):
-        depth = body.depth(points[index])
-        on = depth >= -slack
-        index, depth = index[on], depth[on]
-        outside[index] += slack if body.surface is not None else np.maximum(0.0, -4.0 * depth)
-        if not len(index):
-            return replace(known, upper=math.inf, point_a=None, point_b=None)
-    k = int(index[0])
-    return replace(known, upper=known.upper + float(outside[k]), point_a=p[k], point_b=q[k])
-
-
-def face_to_face(known: Distance, piece: Convex, other: Convex, a: ClosedForm, b: ClosedForm, T: Array) -> Distance:
-    """``known`` with points of the two faces that look at each other across its planes, where both bodies have them.
-
-    A hole or the mouth of a groove may take the solver's own points away.
-    """
-    n, R, t = known.normal, T[:3, :3], T[:3, 3]
-    assert n is not None
-    p, q = piece.face(n), other.face(-n @ R) @ R.T + t
-    gap = known.lower
-    p, q = np.vstack([p, q - gap * n]), np.vstack([p + gap * n, q])
-    if gap >= 0.0:
-        return _attested(replace(known, upper=gap, method="convex"), a, b, T, p, q)
-    found = _deepest_common(known, a, b, T, np.vstack([p, q, 0.5 * (p + q)]))
-    return replace(found, method="convex")
-
-
-def _along(piece: Convex, T: Array | None) -> Array:
-    """Shifts (k, 3) along a rod's axis in equal steps; none for other pieces."""
-    if not isinstance(piece, Rod):
-        return np.empty((0, 3))
-    axis = piece.T[:3, 2] if T is None else T[:3, :3] @ piece.T[:3, 2]
-    return np.outer(np.linspace(-1.0, 1.0, 2 * _SHIFTS - 1) * piece.length, axis)
+    other = q[k] if k < len(p) and in_b[len(p) + k] >= -slack else trials[k]
+    return replace(known, upper=upper, point_a=trials[k], point_b=other)

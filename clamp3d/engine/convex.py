@@ -1,10 +1,9 @@
 """Convex pieces, and the signed distance of two of them between proven bounds.
 
-Nearest points are found among corners, edges, faces, axes and rims in closed form, for large hulls near the place that
-FCL names. No answer is taken at its word: its two points must lie in the pieces, which bounds the distance from above,
-and the width of the slab between the pieces along a normal (support functions, closed form) bounds it from below. So a
-wrong answer costs sharpness, not truth. Depth likewise: a translation that parts the pieces bounds it from above, a
-point inside both from below.
+FCL names the nearest points. It is not taken at its word: they must lie in the pieces, which bounds the distance from
+above, and the width of the slab between the pieces along a normal (support functions, closed form) bounds it from
+below. So a wrong answer costs sharpness, not truth. In an overlap a point in both pieces attests a depth, and a slab
+bounds it; `convex_depth` sharpens that where it matters.
 """
 
 from __future__ import annotations
@@ -16,14 +15,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.hull import FLAT, MEMBER, SMALL, Hull
-from clamp3d.engine.nearest import rim_minimum, segment_pairs, to_faces
-from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source, to_target
+from clamp3d.engine.hull import FLAT, MEMBER, Hull
+from clamp3d.geometry.pose import Array, cross, norm, to_source, to_target
 
 _LEVEL = 1e-6
 """Below this sine it is not claimed that the nearest points are the only ones: rounding decides."""
 _TOUCHING = 1e-3
 """Distances and depths (mm) below which FCL's normal may be mostly rounding, so that it is searched for."""
+_ENLARGED = 2.0**27
+"""FCL measures pieces this much larger: its solver stops at an absolute 1e-6, and a power of two costs no rounding.
+Of random boxes and cylinders the bounds are then 1e-13 mm apart, in place of up to 4e-4."""
 _EPS = 2.0**-52
 
 
@@ -82,14 +83,6 @@ class Rod:
         aside = size > 1e-9
         return np.vstack([np.copysign(1.0, along) * axis, across[aside] / size[aside, None]])
 
-    def closest(self, points: Array) -> Array:
-        """The points of the rod (k, 3) that are nearest to ``points`` (k, 3)."""
-        local = to_source(self.T, points)
-        out = np.hypot(local[:, 0], local[:, 1])
-        local[:, :2] *= np.minimum(1.0, self.radius / np.maximum(out, 1e-300))[:, None]
-        local[:, 2] = np.clip(local[:, 2], -0.5 * self.length, 0.5 * self.length)
-        return np.asarray(to_target(self.T, local))
-
     @property
     def ends(self) -> Array:
         """Both ends (2, 3) of the axis."""
@@ -99,31 +92,124 @@ class Rod:
 Convex: TypeAlias = Rod | Hull
 
 
-def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, rims: bool = True) -> Distance:
+def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, sharp: bool = True) -> Distance:
     """Signed distance of two convex pieces placed by ``Ta``, ``Tb`` (4, 4); points and normal in that frame.
 
-    Closed forms first; what they leave open goes to FCL, whose answer is polished. Without ``rims`` the rims of a
-    cylinder, which take long, are left to FCL.
+    Not ``sharp``: pieces that all but touch are not searched for the direction that proves it.
     """
-    found = _closed_form(a, Ta, b, Tb, None, rims)
-    if found.upper - found.lower > 1e-10:
-        found = found.meet(_by_gjk(a, Ta, b, Tb))
-    if rims and found.upper - found.lower > 1e-9 and abs(found.upper) < _TOUCHING:
+    import fcl
+
+    pair = _enlarged(a, Ta), _enlarged(b, Tb)
+    answer = fcl.DistanceResult()
+    fcl.distance(*pair, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=_libccd()), answer)
+    p, q = (np.asarray(x, dtype=np.float64) / _ENLARGED for x in answer.nearest_points)
+    if answer.min_distance > 0.0 and 0.0 < norm(q - p) < np.inf:
+        distance = _apart(a, Ta, b, Tb, p, q)
+    else:
+        distance = _overlapping(a, Ta, b, Tb, pair)
+    if sharp and distance.upper - distance.lower > 1e-9 and abs(distance.upper) < _TOUCHING:
         from clamp3d.engine.convex_depth import convex_depth  # which needs the pieces of this module
 
-        found = found.meet(Distance(convex_depth(a, Ta, b, Tb).lower))
-    return replace(found, unique=_unique(a, Ta, b, Tb, found))
+        distance = distance.meet(Distance(convex_depth(a, Ta, b, Tb).lower))
+    return replace(distance, unique=_unique(a, Ta, b, Tb, distance))
 
 
-def _closed_form(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array | None, rims: bool) -> Distance:
-    """What corners, edges, faces, axes and rims say; of large hulls only those that face along ``n``."""
-    if isinstance(a, Rod):
-        if isinstance(b, Rod):
-            return _rods(a, Ta, b, Tb, rims)
-        return _rod_hull(a, Ta, b, Tb, n, rims)
-    if isinstance(b, Rod):
-        return _rod_hull(b, Tb, a, Ta, None if n is None else -n, rims).swapped()
-    return _hulls(a, Ta, b, Tb, n)
+def _libccd() -> Any:
+    """FCL's solver for convex shapes; the other one is wrong for crossed cylinders."""
+    import fcl
+
+    return fcl.GJKSolverType.GST_LIBCCD
+
+
+def _apart(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array) -> Distance:
+    """Bounds of the distance of two pieces from their nearest points as FCL names them."""
+    size = norm(q - p)
+    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / size)
+    outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
+    distance = Distance(low, size + 2.0 * outside, p, q, normal, None, "features", "convex")
+    # The direction of a short distance is mostly rounding.
+    return distance if size - low < 1e-5 else distance.meet(_slab_of_faces(a, Ta, b, Tb))
+
+
+def _overlapping(a: Convex, Ta: Array, b: Convex, Tb: Array, pair: tuple[Any, Any]) -> Distance:
+    """Bounds of the depth of two pieces from FCL's contact; of the distance where they touch within rounding."""
+    import fcl
+
+    contacts = fcl.CollisionResult()
+    fcl.collide(*pair, fcl.CollisionRequest(enable_contact=True, gjk_solver_type=_libccd()), contacts)
+    distance = Distance()
+    for contact in contacts.contacts:
+        n, place = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos) / _ENLARGED
+        if not 0.0 < norm(n) < np.inf:
+            continue
+        n = n / norm(n)
+        low, normal = _slab(a, Ta, b, Tb, np.array([n, -n]))
+        half = 0.5 * abs(float(contact.penetration_depth)) / _ENLARGED
+        distance = replace(_deepest(a, Ta, b, Tb, place + np.outer((0.0, -half, half), n), low), normal=normal)
+    shallow = distance.upper > -_TOUCHING or distance.lower > -_TOUCHING
+    return distance.meet(_slab_of_faces(a, Ta, b, Tb)) if shallow else distance
+
+
+def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: Array, low: float) -> Distance:
+    """Distance in an overlap: the deepest of ``trials`` (k, 3) that lie in both pieces, beside a proven ``low``."""
+    in_a, in_b = a.depth(to_source(Ta, trials)), b.depth(to_source(Tb, trials))
+    inside = np.minimum(in_a, in_b) >= -MEMBER * (1.0 + float(np.abs(trials).max()))
+    depth = np.where(inside, np.maximum(in_a, in_b), -np.inf)
+    k = int(np.argmax(depth))
+    if depth[k] == -np.inf:
+        return Distance(low, method="convex")
+    outside = max(0.0, -float(min(in_a[k], in_b[k])))
+    upper = 4.0 * outside - max(0.0, float(depth[k]))
+    return Distance(low, max(low, upper), trials[k], trials[k], None, None, "features", "convex")
+
+
+def _slab_of_faces(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
+    """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
+    trials = []
+    for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
+        axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
+        trials.append((sign * axes) @ T[:3, :3].T)
+    low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
+    return Distance(low, normal=normal, method="convex")
+
+
+def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, near: Array) -> tuple[float, Array]:
+    """Largest signed gap between two planes that part the pieces, square to one of the normals ``near`` (k, 3) from a
+    to b or to what either piece has beside one; and that normal (3,).
+    """
+    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
+    offset = Tb[:3, 3] - Ta[:3, 3]
+    n = np.vstack([near, a.normals(near @ Ra) @ Ra.T, -(b.normals(-(near @ Rb)) @ Rb.T)])
+    na, nb = n @ Ra, -(n @ Rb)
+    reach = np.einsum("ij,ij->i", na, a.support(na)) + np.einsum("ij,ij->i", nb, b.support(nb))
+    gap = n @ offset - reach
+    gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
+    k = int(np.argmax(gap))
+    return float(gap[k]), n[k]
+
+
+def _depth(piece: Convex, T: Array, x: Array) -> float:
+    return float(piece.depth(to_source(T, x)[None])[0])
+
+
+@lru_cache(maxsize=4096)
+def _geometry(piece: Convex) -> tuple[Any, Array]:
+    """FCL's shape, enlarged, and the pose it has in the part's frame."""
+    import fcl
+
+    if isinstance(piece, Rod):
+        return fcl.Cylinder(_ENLARGED * piece.radius, _ENLARGED * piece.length), piece.T
+    flat = np.column_stack([np.full(len(piece.faces), 3), piece.faces]).ravel()
+    return fcl.Convex(_ENLARGED * piece.vertices, len(piece.faces), flat), np.eye(4)
+
+
+def _enlarged(piece: Convex, T: Array) -> Any:
+    """The piece, placed by ``T`` (4, 4), as FCL's object."""
+    import fcl
+
+    shape, own = _geometry(piece)
+    P = T @ own
+    return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], _ENLARGED * P[:3, 3]))
 
 
 def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool | None:
@@ -143,191 +229,3 @@ def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float
     if u is not None and v is not None:
         return bool(norm(cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within)
     return True
-
-
-def _placed(points: Array, T: Array) -> Array:
-    return np.asarray(to_target(T, points))
-
-
-def _hulls(a: Hull, Ta: Array, b: Hull, Tb: Array, n: Array | None) -> Distance:
-    """Two polyhedra: corners against faces and edges against edges; of large ones what looks along ``n``."""
-    if n is None and max(len(a.vertices), len(b.vertices)) > SMALL:
-        return Distance()
-    Va, Ea, Fa = (_placed(x, Ta) for x in a.near(None if n is None else n @ Ta[:3, :3]))
-    Vb, Eb, Fb = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
-    trials = [segment_pairs(Ea, Eb), to_faces(Va, Fb)]
-    d, q, p = to_faces(Vb, Fa)
-    d, p, q = min([*trials, (d, p, q)], key=lambda found: found[0])
-    return _proven(a, Ta, b, Tb, p, q, d)
-
-
-def _proven(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array, d: float) -> Distance:
-    """Points ``p``, ``q`` of two pieces that are ``d`` mm apart, with what the slab between the pieces proves."""
-    size = norm(q - p)
-    if not 0.0 < d < np.inf or abs(size - d) > 1e-6 * d:  # so close that the points' difference is mostly rounding
-        return Distance()
-    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / size)
-    if d - low > 1e-5 * (1.0 + d):  # they overlap, or another place is nearer
-        return Distance(low, normal=normal)
-    return Distance(low, d, p, q, normal, None, "features", "convex")
-
-
-def _rod_hull(a: Rod, Ta: Array, b: Hull, Tb: Array, n: Array | None, rims: bool) -> Distance:
-    """A cylinder and a polyhedron: its axis against edges and faces, less the radius; then its rims."""
-    if n is None and len(b.vertices) > SMALL:
-        return Distance()
-    _V, E, F = (_placed(x, Tb) for x in b.near(None if n is None else -n @ Tb[:3, :3]))
-    ends = _placed(a.ends, Ta)
-    d, x, q = min([segment_pairs(ends[None], E), to_faces(ends, F)], key=lambda found: found[0])
-    if not d > 1e-9 * a.radius or b.crossed_by(_placed(ends, inverse(Tb))):
-        return Distance()
-    m = (q - x) / d
-    axis = Ta[:3, :3] @ a.T[:3, 2]
-    found = Distance()
-    if abs(float(m @ axis)) <= FLAT:  # square to the axis: on the side
-        p = x + a.radius * m
-        low, normal = _slab(a, Ta, b, Tb, m[None])
-        if d >= a.radius:
-            found = Distance(low, d - a.radius, p, q, normal, None, "features", "convex")
-        else:
-            found = _deepest(a, Ta, b, Tb, [q, p, 0.5 * (p + q)], low, 0.0)
-            found = replace(found, normal=normal, point_a=p, point_b=q) if found.upper < np.inf else found
-    if rims and found.upper - found.lower > 1e-10 and len(b.vertices) <= SMALL:
-        found = found.meet(_rims(a, Ta, b, Tb))
-    return found
-
-
-def _rods(a: Rod, Ta: Array, b: Rod, Tb: Array, rims: bool) -> Distance:
-    """Two cylinders: axis against axis, ends against ends, rims against the other cylinder."""
-    found = Distance()
-    ends_a, ends_b = _placed(a.ends, Ta), _placed(b.ends, Tb)
-    d, x, y = segment_pairs(ends_a[None], ends_b[None])
-    n = (y - x) / max(d, 1e-300)
-    square = all(abs(float(n @ (T[:3, :3] @ rod.T[:3, 2]))) <= FLAT for rod, T in ((a, Ta), (b, Tb)))
-    if square and d > 1e-9 * (a.radius + b.radius):  # else the feet are on ends, not on the sides
-        p, q = x + a.radius * n, y - b.radius * n
-        if d > a.radius + b.radius:
-            found = _proven(a, Ta, b, Tb, p, q, norm(q - p))
-        else:
-            low, normal = _slab(a, Ta, b, Tb, n[None])
-            deepest = _deepest(a, Ta, b, Tb, [p, q, 0.5 * (p + q)], low, 0.0)
-            found = replace(deepest, normal=normal, point_a=p, point_b=q) if deepest.upper < np.inf else deepest
-    if found.upper - found.lower > 1e-10:
-        found = found.meet(_touching(a, Ta, b, Tb))
-    if rims and found.upper - found.lower > 1e-10:
-        found = found.meet(_rims(a, Ta, b, Tb)).meet(_rims(b, Tb, a, Ta).swapped())
-    return found
-
-
-def _rims(a: Rod, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """The rims of a cylinder against another piece."""
-    back = inverse(Tb)
-    found = Distance()
-    for end in a.ends:
-        T = Ta @ a.T
-        T[:3, 3] = _placed(end, Ta)
-        rim = rim_minimum(lambda x: _placed(b.closest(_placed(x, back)), Tb), T, a.radius)
-        if rim is not None:
-            p, q = rim
-            found = found.meet(_proven(a, Ta, b, Tb, p, q, norm(q - p)))
-    return found
-
-
-def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: list[Array], low: float, slack: float) -> Distance:
-    """Distance in an overlap: the deepest of the ``trials`` (3,) that lie in both pieces, beside a known ``low``."""
-    depths = [(_depth(a, Ta, x), _depth(b, Tb, x)) for x in trials]
-    allowed = slack + 16.0 * _EPS * (1.0 + max(float(np.abs(x).max()) for x in trials))
-    inside = [max(pair) if min(pair) >= -allowed else -np.inf for pair in depths]
-    k = int(np.argmax(inside))
-    if inside[k] == -np.inf:
-        return Distance(low)
-    outside = max(0.0, -min(depths[k]))
-    upper = 4.0 * outside - max(0.0, inside[k])
-    return Distance(low, max(low, upper), trials[k], trials[k], None, None, "features", "convex")
-
-
-@lru_cache(maxsize=4096)
-def _geometry(piece: Convex) -> tuple[Any, Array]:
-    """FCL's shape and the pose it has in the part's frame."""
-    import fcl
-
-    if isinstance(piece, Rod):
-        return fcl.Cylinder(piece.radius, piece.length), piece.T
-    flat = np.column_stack([np.full(len(piece.faces), 3), piece.faces]).ravel()
-    return fcl.Convex(piece.vertices, len(piece.faces), flat), np.eye(4)
-
-
-def _object(piece: Convex, T: Array) -> Any:
-    import fcl
-
-    shape, own = _geometry(piece)
-    P = T @ own
-    return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], P[:3, 3]))
-
-
-def _by_gjk(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """FCL's answer, proven from both sides and polished near the points it names."""
-    import fcl
-
-    oa, ob = _object(a, Ta), _object(b, Tb)
-    answer = fcl.DistanceResult()
-    libccd = fcl.GJKSolverType.GST_LIBCCD
-    fcl.distance(oa, ob, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=libccd), answer)
-    if answer.min_distance > 0.0:
-        p, q = (np.asarray(x, dtype=np.float64) for x in answer.nearest_points)
-        size = norm(q - p)
-        if 0.0 < size < np.inf:
-            n = (q - p) / size
-            low, m = _slab(a, Ta, b, Tb, n[None])
-            outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
-            found = Distance(low, size + 2.0 * outside, p, q, m, None, "features", "convex (GJK)")
-            if found.upper - found.lower > 1e-10 and (isinstance(a, Hull) or isinstance(b, Hull)):
-                found = found.meet(_closed_form(a, Ta, b, Tb, n, False))
-            # The direction of a short distance is mostly rounding.
-            return found if size - low < 1e-5 else found.meet(_touching(a, Ta, b, Tb))
-    contacts = fcl.CollisionResult()
-    request = fcl.CollisionRequest(num_max_contacts=4, enable_contact=True, gjk_solver_type=libccd)
-    if not fcl.collide(oa, ob, request, contacts):
-        return _touching(a, Ta, b, Tb)  # touching within rounding
-    found = Distance()
-    for contact in contacts.contacts:
-        n, at = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos, dtype=np.float64)
-        size = norm(n)
-        if not 0.0 < size < np.inf:
-            continue
-        low, m = _slab(a, Ta, b, Tb, np.array([n, -n]) / size)
-        reach = abs(float(contact.penetration_depth))
-        trials = [at + s * reach * n / size for s in (0.0, -0.5, 0.5, -0.25, 0.25)]
-        new = _deepest(a, Ta, b, Tb, trials, low, MEMBER * (1.0 + float(np.abs(at).max())))
-        found = found.meet(replace(new, normal=m, method="convex (GJK)"))
-    shallow = found.upper > -1e-3 or found.lower > -1e-3
-    return found.meet(_touching(a, Ta, b, Tb)) if shallow else found
-
-
-def _touching(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
-    trials = []
-    for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
-        axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        trials.append((sign * axes) @ T[:3, :3].T)
-    low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
-    return Distance(low, normal=normal, method="convex")
-
-
-def _depth(piece: Convex, T: Array, x: Array) -> float:
-    return float(piece.depth(to_source(T, x)[None])[0])
-
-
-def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, near: Array) -> tuple[float, Array]:
-    """Largest signed gap between two planes that part the pieces, square to one of the normals ``near`` (k, 3) from a
-    to b or to what either piece has beside one; and that normal (3,).
-    """
-    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
-    offset = Tb[:3, 3] - Ta[:3, 3]
-    n = np.vstack([near, a.normals(near @ Ra) @ Ra.T, -(b.normals(-(near @ Rb)) @ Rb.T)])
-    na, nb = n @ Ra, -(n @ Rb)
-    reach = np.einsum("ij,ij->i", na, a.support(na)) + np.einsum("ij,ij->i", nb, b.support(nb))
-    gap = n @ offset - reach
-    gap -= 4.0 * _EPS * (float(np.abs(offset).sum()) + np.abs(gap))
-    k = int(np.argmax(gap))
-    return float(gap[k]), n[k]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.geometry.pose import Array, norm
-from clamp3d.geometry.triangles import closest_points
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
@@ -17,8 +16,6 @@ FLAT = 1e-8
 """Sine of the angle below which a face or line counts as square to a direction."""
 STRAIGHT = 1e-9
 """Sine of the turn of an outline below which it goes straight on."""
-SMALL = 40
-"""Hulls with more corners are searched only where FCL finds the nearest points."""
 _SLIVER = 1e-12
 """Relative to the size: triangles narrower than this have no plane to speak of."""
 _MEMORY = 2_000_000
@@ -74,32 +71,6 @@ class Hull:
     def normals(self, n: Array) -> Array:
         """The face normals (k, 3) nearest to ``n`` (k, 3)."""
         return np.asarray(self.planes[np.argmax(n @ self.planes[:, :3].T, axis=1), :3])
-
-    def near(self, n: Array | None) -> tuple[Array, Array, Array]:
-        """Corners (k, 3), edges (k, 2, 3) and triangles (k, 3, 3), of a large hull only those that face ``n`` (3,)."""
-        V = self.vertices
-        if n is None or len(V) <= SMALL:
-            return V, V[self.edges], V[self.faces]
-        height = V @ n
-        high = height >= height.max() - 0.01 * float(np.ptp(height))
-        return V[high], V[self.edges[high[self.edges].any(axis=1)]], V[self.faces[high[self.faces].any(axis=1)]]
-
-    def closest(self, points: Array) -> Array:
-        """The points of the surface (k, 3) that are nearest to ``points`` (k, 3), which lie outside."""
-        k, m = len(points), len(self.faces)
-        pairs = np.tile(self.vertices[self.faces], (k, 1, 1)), np.repeat(points, m, axis=0)
-        feet = closest_points(*pairs).reshape(k, m, 3)
-        nearest = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
-        return np.asarray(feet[np.arange(k), nearest])
-
-    def crossed_by(self, ends: Array) -> bool:
-        """Whether the segment between ``ends`` (2, 3) meets the polyhedron."""
-        h, k = ends @ self.planes[:, :3].T + self.planes[:, 3]
-        if ((h > 0.0) & (k > 0.0)).any():
-            return False
-        enters, leaves = h > 0.0, k > 0.0
-        low = (h[enters] / (h - k)[enters]).max(initial=0.0)
-        return bool(low <= (h[leaves] / (h - k)[leaves]).min(initial=1.0))
 
     def clipped(self, plane: Array) -> Hull | None:
         """What of it lies in the half-space plane[:3] . x + plane[3] >= 0; None if it has no volume."""

@@ -47,10 +47,10 @@ def _one_way(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], an
         for other in moving.outers:
             if isinstance(other, Rod):
                 swept: Convex = _swept_rod(other, poses, angle)
-                best = max(best, convex_distance(piece, np.eye(4), swept, poses[1], rims=False).lower)
+                best = max(best, convex_distance(piece, np.eye(4), swept, poses[1], sharp=False).lower)
             else:
                 around, sag = _swept_hull(other, poses, angle)
-                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4), rims=False).lower - sag)
+                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4), sharp=False).lower - sag)
     return best
 
 

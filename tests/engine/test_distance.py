@@ -33,7 +33,7 @@ def test_a_cylinder_has_flat_ends_and_the_kernel_a_lower_bound_of_them():
     d = distance(groove, wire, T)
     assert d.value == pytest.approx(3.0, abs=1e-9)
     assert d.uncertainty < 1e-9
-    assert signed_distance(groove, wire, T).distance < d.value
+    assert signed_distance(groove, wire, T).distance <= d.value
     assert distance(wire, groove, inverse(T)).value == pytest.approx(3.0, abs=1e-9)
     assert distance(shapes.groove_block(groove, 60.0, 40.0), shapes.cylinder(10.5, 80.0), T).value == pytest.approx(3.0)
 

