@@ -197,7 +197,7 @@ class _Questions:
         for n, k in enumerate(sorted(overlaps, key=lambda k: rows[k].distance.upper)):
             if progress is not None:
                 progress("depths", n, len(overlaps))
-            rows[k] = self.row(*near[k], gaps[k], depth=True)
+            rows[k] = self.row(near[k][0], near[k][1], gaps[k], depth=True)
             if on_row is not None:
                 on_row(rows[k])
         return rows
