@@ -58,7 +58,7 @@ class Allowances:
 
     def overlap(self, a: str, b: str) -> float | None:
         """Largest overlap that is allowed, mm; None if even contact is not meant."""
-        found = [item.overlap for item in self.patterns if item.fits(a, b)]
+        overlaps = [item.overlap for item in self.patterns if item.fits(a, b)]
         if (a, b) in self.exact:
-            found.append(self.exact[a, b])
-        return max(found) if found else None
+            overlaps.append(self.exact[a, b])
+        return max(overlaps) if overlaps else None

@@ -187,11 +187,11 @@ class Distances:
         least = f", least {self.upper.min():.9g} mm" if len(self) else ""
         return f"Distances({len(self)} poses{least})"
 
-    def with_rows(self, rows: list[int], found: list[Distance]) -> Distances:
+    def with_rows(self, rows: list[int], distances: list[Distance]) -> Distances:
         """The same with single distances in place of ``rows``."""
         names, method = ("lower", "upper", "point_a", "point_b", "normal"), list(self.method)
         fields = {name: getattr(self, name).copy() for name in names}
-        for k, d in zip(rows, found, strict=True):
+        for k, d in zip(rows, distances, strict=True):
             method[k] = d.method
             for name, values in fields.items():
                 value = getattr(d, name)

@@ -94,9 +94,9 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     i, j = pairs[:, 0], pairs[:, 1]
     d = boxes.centre[j] - boxes.centre[i]
     gap = np.abs(d) - boxes.reach[i] - boxes.reach[j]
-    found = np.where((gap > 0.0).any(axis=1), np.linalg.norm(np.maximum(gap, 0.0), axis=1), gap.max(axis=1))
+    lower = np.where((gap > 0.0).any(axis=1), np.linalg.norm(np.maximum(gap, 0.0), axis=1), gap.max(axis=1))
     radius = np.linalg.norm(boxes.half, axis=1)
-    found = np.maximum(found, np.linalg.norm(d, axis=1) - radius[i] - radius[j])
+    lower = np.maximum(lower, np.linalg.norm(d, axis=1) - radius[i] - radius[j])
     A, B = np.swapaxes(boxes.R[i], 1, 2), np.swapaxes(boxes.R[j], 1, 2)  # rows: the boxes' own axes
     (ax, ay, az), (bx, by, bz) = np.moveaxis(A[:, :, None], 3, 0), np.moveaxis(B[:, None], 3, 0)
     crossed = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=3).reshape(len(pairs), 9, 3)
@@ -105,5 +105,5 @@ def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:
     axes = axes / np.maximum(size, 1e-300)[..., None]
     spread = [(np.abs(axes @ np.swapaxes(X, 1, 2)) * boxes.half[k][:, None]).sum(axis=2) for X, k in ((A, i), (B, j))]
     apart = np.abs(np.einsum("mkj,mj->mk", axes, d)) - spread[0] - spread[1]
-    found = np.maximum(found, np.where(size > 1e-6, apart, -np.inf).max(axis=1))
-    return np.asarray(found - 1e-12 * (1.0 + np.abs(d).max(axis=1)))
+    lower = np.maximum(lower, np.where(size > 1e-6, apart, -np.inf).max(axis=1))
+    return np.asarray(lower - 1e-12 * (1.0 + np.abs(d).max(axis=1)))

@@ -63,11 +63,11 @@ class ClosedForm:
         """How deep points (k, 3) lie inside, never too much; negative outside."""
         if self.surface is not None:
             return self.surface(points)
-        found = np.min([piece.depth(points) for piece in self.outers], axis=0)
+        depth = np.min([piece.depth(points) for piece in self.outers], axis=0)
         for bore in self.bores:
             local = to_source(bore.T, points)
-            found = np.minimum(found, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
-        return np.asarray(found)
+            depth = np.minimum(depth, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
+        return np.asarray(depth)
 
     @cached_property
     def bounds(self) -> Array:
@@ -124,34 +124,34 @@ def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
     covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
     tilt = norm(cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
     flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
-    answer, place = min(flat, key=lambda found: found[0].distance)
-    found = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
+    answer, place = min(flat, key=lambda cover: cover[0].distance)
+    distance = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
     if answer.distance > answer.error_bound:
-        return found
+        return distance
     answers = [signed_distance(groove, Capsule(rod.radius, rod.length), P) for groove, _, P in covers]
     if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer in answers):
         return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
-    return replace(found, lower=min(answer.distance - answer.error_bound for answer in answers))
+    return replace(distance, lower=min(answer.distance - answer.error_bound for answer in answers))
 
 
 def _with_witnesses(
-    known: Distance, pieces: tuple[Convex | None, Convex], a: ClosedForm, b: ClosedForm, T: Array
+    raw: Distance, pieces: tuple[Convex | None, Convex], a: ClosedForm, b: ClosedForm, T: Array
 ) -> Distance:
-    """``known`` of two ``pieces`` with its upper side kept only if points that both bodies have attest it.
+    """``raw`` of two ``pieces`` with its upper side kept only if points that both bodies have attest it.
 
     Apart, two points must lie on the bodies. Overlapping, a point that lies in both attests the depth it has in either.
     A hole or the mouth of a groove may have taken the named points away, so others of the faces that look at each other
     are tried too. ``T`` (4, 4) places b in a's frame, where the points are.
     """
-    distance = replace(known, upper=math.inf, point_a=None, point_b=None)
-    if known.point_a is not None and known.point_b is not None:
-        attest = _on_both if known.upper >= 0.0 else _in_both
-        distance = attest(known, a, b, T, known.point_a[None], known.point_b[None])
+    distance = replace(raw, upper=math.inf, point_a=None, point_b=None)
+    if raw.point_a is not None and raw.point_b is not None:
+        attest = _on_both if raw.upper >= 0.0 else _in_both
+        distance = attest(raw, a, b, T, raw.point_a[None], raw.point_b[None])
     expensive = a.surface is not None or b.surface is not None
-    if distance.upper - known.lower <= 1e-10 or known.normal is None or (expensive and known.lower < -0.01):
+    if distance.upper - raw.lower <= 1e-10 or raw.normal is None or (expensive and raw.lower < -0.01):
         return distance
-    attest = _on_both if known.lower >= 0.0 else _in_both
-    return distance.meet(attest(known, a, b, T, *_facing(known.normal, known.lower, pieces, T)))
+    attest = _on_both if raw.lower >= 0.0 else _in_both
+    return distance.meet(attest(raw, a, b, T, *_facing(raw.normal, raw.lower, pieces, T)))
 
 
 def _facing(n: Array, gap: float, pieces: tuple[Convex | None, Convex], T: Array) -> tuple[Array, Array]:
@@ -165,20 +165,20 @@ def _facing(n: Array, gap: float, pieces: tuple[Convex | None, Convex], T: Array
     return p, q
 
 
-def _on_both(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
-    """``known`` with the first of the pairs ``p``, ``q`` (k, 3) that lie on the bodies, or without points."""
+def _on_both(raw: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
+    """``raw`` with the first of the pairs ``p``, ``q`` (k, 3) that lie on the bodies, or without points."""
     slack = MEMBER * (1.0 + float(max(np.abs(p).max(), np.abs(q).max())))
     depth = np.minimum(a.depth(p), b.depth(to_source(T, q)))
     on_both = np.flatnonzero(depth >= -slack)
     if not len(on_both):
-        return replace(known, upper=math.inf, point_a=None, point_b=None)
+        return replace(raw, upper=math.inf, point_a=None, point_b=None)
     k = int(on_both[0])
     outside = 4.0 * max(0.0, -float(depth[k])) if a.surface is None and b.surface is None else slack
-    return replace(known, upper=norm(q[k] - p[k]) + outside, point_a=p[k], point_b=q[k])
+    return replace(raw, upper=norm(q[k] - p[k]) + outside, point_a=p[k], point_b=q[k])
 
 
-def _in_both(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
-    """``known`` with the deepest point of the pairs ``p``, ``q`` (k, 3), and between them, that lies in both bodies.
+def _in_both(raw: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, q: Array) -> Distance:
+    """``raw`` with the deepest point of the pairs ``p``, ``q`` (k, 3), and between them, that lies in both bodies.
 
     Where that is one of ``p``, and ``q`` lies on the other body, the two are the pair of points.
     """
@@ -188,8 +188,8 @@ def _in_both(known: Distance, a: ClosedForm, b: ClosedForm, T: Array, p: Array, 
     both = np.where(np.minimum(in_a, in_b) >= -slack, np.maximum(in_a, in_b), -np.inf)
     k = int(np.argmax(both))
     if both[k] == -np.inf:
-        return replace(known, upper=math.inf, point_a=None, point_b=None)
+        return replace(raw, upper=math.inf, point_a=None, point_b=None)
     outside = max(0.0, -float(min(in_a[k], in_b[k])))
-    upper = max(known.lower, min(0.0, 4.0 * outside - float(both[k])))
+    upper = max(raw.lower, min(0.0, 4.0 * outside - float(both[k])))
     other = q[k] if k < len(p) and in_b[len(p) + k] >= -slack else trials[k]
-    return replace(known, upper=upper, point_a=trials[k], point_b=other)
+    return replace(raw, upper=upper, point_a=trials[k], point_b=other)

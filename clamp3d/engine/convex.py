@@ -212,10 +212,10 @@ def _enlarged(piece: Convex, T: Array) -> Any:
     return fcl.CollisionObject(shape, fcl.Transform(P[:3, :3], _ENLARGED * P[:3, 3]))
 
 
-def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, found: Distance) -> bool | None:
+def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, distance: Distance) -> bool | None:
     """Whether the nearest points are the only ones, from what of either piece lies furthest along the normal."""
-    n = found.normal
-    if n is None or found.lower < -1e-9:
+    n = distance.normal
+    if n is None or distance.lower < -1e-9:
         return None
     flat, nearly = (_several(a, Ta, b, Tb, n, within) for within in (FLAT, _LEVEL))
     return not flat if flat == nearly else None

@@ -113,12 +113,12 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array, *, tolerance: float
 
 def _faces(N: Array, Va: Array, Vb: Array) -> Array:
     """Points (k, 3) that span the flat faces of the difference which look along ``N``."""
-    found = []
+    points = []
     for n in N:
         A, B = (V[h >= h.max() - 1e-9 * (1.0 + np.ptp(h))] for V, h in ((Va, Va @ n), (Vb, -(Vb @ n))))
         if len(A) * len(B) <= 4096:
-            found.append((A[:, None] - B[None]).reshape(-1, 3))
-    return np.vstack(found) if found else np.empty((0, 3))
+            points.append((A[:, None] - B[None]).reshape(-1, 3))
+    return np.vstack(points) if points else np.empty((0, 3))
 
 
 def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[float, float, Array]:
@@ -134,10 +134,10 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         if upper <= 0.0:
             return upper, upper, n
         try:
-            made = hull(P)
+            inner = hull(P)
         except ValueError:  # the points are too near to each other for it; the bounds so far hold
             break
-        planes = made.planes
+        planes = inner.planes
         lower = max(lower, -float(planes[:, 3].max()))
         if upper - lower <= tolerance:
             break
@@ -152,7 +152,7 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
         if not fresh.any():
             lower = min(float((-planes[:, 3]).min()), upper)
             break
-        P = np.vstack([made.vertices, new[fresh]])
+        P = np.vstack([inner.vertices, new[fresh]])
     return lower, upper, n
 
 

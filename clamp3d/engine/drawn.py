@@ -24,19 +24,19 @@ def bodies_of(solid: Solid) -> tuple[ClosedForm, ...] | None:
     An outline is taken apart at the chords of its arcs: what remains must be convex. Each convex arc adds the segment
     between it and its chord, each concave one is a groove.
     """
-    found: list[ClosedForm] = []
+    bodies: list[ClosedForm] = []
     for body in solid.bodies:
         pieces = _pieces(body)
         if pieces is None:
             return None
-        made = [ClosedForm(outers, tuple(grooves)) for outers, grooves in pieces]
+        forms = [ClosedForm(outers, tuple(grooves)) for outers, grooves in pieces]
         for hole in solid.holes:
-            cut = [_less(piece, hole) for piece in made]
+            cut = [_less(piece, hole) for piece in forms]
             if any(one is None for one in cut):
                 return None
-            made = [piece for one in cut if one is not None for piece in one]
-        found += made
-    return tuple(found)
+            forms = [piece for one in cut if one is not None for piece in one]
+        bodies += forms
+    return tuple(bodies)
 
 
 def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | None:
@@ -86,8 +86,8 @@ def _beyond_chord(body: Extrusion, arc: Arc) -> Hull:
     step = arc.sweep / _TANGENTS
     angles = [arc.start_angle, *(arc.start_angle + (k + 0.5) * step for k in range(_TANGENTS)), arc.end_angle]
     radii = [arc.radius, *[arc.radius / math.cos(0.5 * step)] * _TANGENTS, arc.radius]
-    around = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(radii)[:, None]
-    return prism(np.array(arc.centre) + around, body.start, body.end, body.frame)
+    tangents = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(radii)[:, None]
+    return prism(np.array(arc.centre) + tangents, body.start, body.end, body.frame)
 
 
 def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
@@ -128,10 +128,10 @@ def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
         rod = rods[0]
         sides = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
         box = hull(to_target(rod.T, sides * (rod.radius, rod.radius, 0.5 * rod.length)))
-        around = box.clipped(plane)
-        if around is None:
+        enclosing = box.clipped(plane)
+        if enclosing is None:
             return None
-        outers.append(around)
+        outers.append(enclosing)
     for rod in rods:
         offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
         if abs(float(plane[:3] @ rod.T[:3, 2])) < STRAIGHT and abs(offset) < rod.radius:

@@ -49,12 +49,12 @@ def bodies_of_fit(
             through[feature.faces] = True
     depth = _FittedDepth(result, model, chord, flat)
     rods, rest = _rods(result, V, F, through)
-    made = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
+    bodies = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
     points = _outside(result, V, F, chord) if rest else V
     for index in rest:
         off = error + stated + depth.bulging
-        made.append(ClosedForm((hull(points[index]),), tuple(bores), error=off, surface=depth))
-    return tuple(made)
+        bodies.append(ClosedForm((hull(points[index]),), tuple(bores), error=off, surface=depth))
+    return tuple(bodies)
 
 
 def _outside(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
@@ -182,8 +182,8 @@ def _nearest_to_axis(flat: Array) -> tuple[Array, Array]:
     t = np.clip(-np.einsum("ijk,ijk->ij", a, ab) / square, 0.0, 1.0)
     edges = np.linalg.norm(a + t[..., None] * ab, axis=2)
     cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    around = (cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)
-    return np.where(around, 0.0, edges.min(axis=1)), edges
+    encloses = (cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)
+    return np.where(encloses, 0.0, edges.min(axis=1)), edges
 
 
 def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> tuple[list[Rod], list[Faces]]:

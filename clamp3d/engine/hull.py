@@ -94,17 +94,17 @@ def hull(points: Array) -> Hull:
 
     points = np.ascontiguousarray(points, dtype=np.float64)
     try:
-        made = ConvexHull(points)
+        qhull = ConvexHull(points)
     except QhullError as error:
         raise ValueError("the points lie in one plane") from error
-    faces = made.simplices.astype(np.int64)
+    faces = qhull.simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), made.equations[:, :3]) < 0.0
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), qhull.equations[:, :3]) < 0.0
     faces[inward] = faces[inward, ::-1]
     number = np.empty(len(points), dtype=np.int64)
-    number[made.vertices] = np.arange(len(made.vertices))
-    normals = made.equations[np.unique(made.equations.round(12), axis=0, return_index=True)[1], :3]
-    return Hull(points[made.vertices], _planes(normals, points), number[faces])
+    number[qhull.vertices] = np.arange(len(qhull.vertices))
+    normals = qhull.equations[np.unique(qhull.equations.round(12), axis=0, return_index=True)[1], :3]
+    return Hull(points[qhull.vertices], _planes(normals, points), number[faces])
 
 
 def prism(corners: Array, start: float, end: float, frame: Array) -> Hull:

@@ -94,9 +94,9 @@ class Model:
             from clamp3d.engine.fitted import bodies_of_fit
 
             if self.exact is not None:
-                made = self.exact.tessellated(CHORD)
-                flat = self.exact.surfaces.kind[made.face] == PLANE
-                return bodies_of_fit(self._fit, mesh, chord=made.errors, flat=flat)
+                tessellation = self.exact.tessellated(CHORD)
+                flat = self.exact.surfaces.kind[tessellation.face] == PLANE
+                return bodies_of_fit(self._fit, mesh, chord=tessellation.errors, flat=flat)
             return bodies_of_fit(self._fit, mesh, stated=self.shape.error)
         if len(mesh.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
             return None
@@ -216,9 +216,9 @@ class Model:
 
     def outer(self, error: float) -> Surface:
         """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
-        made = self._made(self._outer, enclosing, error)
-        assert made is not None
-        return made
+        surface = self._made(self._outer, enclosing, error)
+        assert surface is not None
+        return surface
 
     def inner(self, error: float) -> Surface | None:
         """Mesh of chord error ``error`` mm that a drawn solid holds, or None; a mesh shape's own facets."""

@@ -47,8 +47,8 @@ def modelled(a: Model, b: Model, T: Array, exact: Distance, model: ContactModel)
     for first, second, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
         for gap, pair in groove_pairs(first, second, place):
             if abs(gap - exact.upper) <= _SAME:
-                found = _asked(model, pair, place)
-                return found.moved(T).swapped() if swapped else found
+                distance = _asked(model, pair, place)
+                return distance.moved(T).swapped() if swapped else distance
     return exact
 
 

@@ -77,17 +77,17 @@ class MovingPair:
     ) -> tuple[Distance, float]:
         """Least distance on the way, and its time; with ``thresholds`` sharp where that is cheap or they need it."""
         accuracy = self.accuracy if thresholds is None else CHECKED
-        best, at, overlaps = Distance(), 0.0, 0
+        best, t_best, overlaps = Distance(), 0.0, 0
 
         def distance(t: float) -> tuple[float, float]:
-            nonlocal best, at, overlaps
+            nonlocal best, t_best, overlaps
             here = self._sharp(t, best.upper, accuracy, thresholds)
             if here.upper < best.upper:
-                best, at = here, t
+                best, t_best = here, t
                 if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
                     raise _CertainError
             overlaps += best.upper < -ACCURACY
-            if overlaps > self.overlaps:  # how deep it is at its deepest no bound here tells
+            if overlaps > self.overlaps:  # no bound here says how deep the deepest overlap is
                 raise _CertainError
             return here.lower, here.upper
 
@@ -98,8 +98,8 @@ class MovingPair:
         try:
             bounds = least(distance, self.speed, bound=self.between, accuracy=accuracy, most=MOST, is_enough=is_certain)
         except _CertainError:
-            return replace(best, lower=-np.inf), at
-        return replace(best, lower=min(bounds.lower, best.upper)), at
+            return replace(best, lower=-np.inf), t_best
+        return replace(best, lower=min(bounds.lower, best.upper)), t_best
 
     def _sharp(self, t: float, best: float, accuracy: float, thresholds: Thresholds | None) -> Distance:
         """The distance at ``t``, refined as far as it can matter: known, deep enough, or above the ``best`` so far."""

@@ -36,8 +36,8 @@ def open_distance(a: Model, b: Model, T: Array) -> Distance:
     meet = surfaces_meet(inner_a, inner_b, T)
     upper, p, q = (0.0, None, None) if meet else nearest_points(inner_a, inner_b, T)[1:]
     if upper <= rounding:
-        depth, at = _crossing(inner_a, inner_b, T)
-        return Distance(-np.inf, error + rounding - depth, at, at)
+        depth, point = _crossing(inner_a, inner_b, T)
+        return Distance(-np.inf, error + rounding - depth, point, point)
     for outer, inner, place, closed in ((inner_a, inner_b, T, a.closed), (inner_b, inner_a, inverse(T), b.closed)):
         if one_inside(outer, inner, place):
             # In a closed part the other's surface is an overlap; an open one may or may not hold the other part.
@@ -61,10 +61,10 @@ def _crossing(a: Surface, b: Surface, T: Array) -> tuple[float, Array | None]:
     best, where = 0.0, None
     for edges, triangles in ((P, Q), (Q, P)):
         for k in range(3):
-            margin, at = _pierced(edges[:, k], edges[:, (k + 1) % 3], triangles)
+            margin, points = _pierced(edges[:, k], edges[:, (k + 1) % 3], triangles)
             row = int(np.argmax(margin))
             if margin[row] > best:
-                best, where = float(margin[row]), at[row]
+                best, where = float(margin[row]), points[row]
     return best, where
 
 
@@ -84,9 +84,9 @@ def _pierced(start: Array, end: Array, triangles: Array) -> tuple[Array, Array]:
     slope = np.abs(cosine)
     steep = slope > 1e-9
     reach = np.einsum("ij,ij->i", triangles[:, 0] - start, normal) / np.where(steep, cosine, 1.0)
-    at = start + reach[:, None] * along
+    points = start + reach[:, None] * along
     inward = np.cross(normal[:, None], sides)
     inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-300)[:, :, None]
-    to_border = np.einsum("ijk,ijk->ij", at[:, None] - triangles, inward).min(axis=1)
+    to_border = np.einsum("ijk,ijk->ij", points[:, None] - triangles, inward).min(axis=1)
     margin = np.minimum(to_border * slope / (1.0 + slope), np.minimum(reach, length - reach) * slope)
-    return np.where(steep, np.maximum(margin, 0.0), 0.0), at
+    return np.where(steep, np.maximum(margin, 0.0), 0.0), points

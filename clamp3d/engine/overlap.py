@@ -79,10 +79,10 @@ class Common:
 
 def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
-    made = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
-    if made.is_empty():
+    intersection = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
+    if intersection.is_empty():
         return None
-    mesh = made.to_mesh64()
+    mesh = intersection.to_mesh64()
     V, F = np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
     return Common(V, F) if len(F) else None
 

@@ -80,9 +80,9 @@ class PoseVerdicts:
         return np.asarray(_NAMES[worst])
 
     def _whole(self, other: Any, values: NDArray[Any]) -> NDArray[Any]:
-        made = np.full((self.poses, len(self.others)), other, dtype=values.dtype)
-        made[self.row, self.column] = values
-        return made
+        matrix = np.full((self.poses, len(self.others)), other, dtype=values.dtype)
+        matrix[self.row, self.column] = values
+        return matrix
 
 
 def check_poses(
@@ -163,9 +163,9 @@ def _judged(
     left = np.flatnonzero((rank == _UNCERTAIN) | holds)
     if len(left):
         poses = np.concatenate([T[left], np.eye(4)[None]])
-        around = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
+        boxes = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
         pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
-        gaps = box_gaps(Boxes.of(around, poses), pairs)
+        gaps = box_gaps(Boxes.of(boxes, poses), pairs)
         a.counters.queries["boxes"] += len(left)
     for k, m in enumerate(left.tolist()):
         if holds[m]:

@@ -130,16 +130,16 @@ class CheckResult:
     @property
     def counts(self) -> dict[str, int]:
         """Number of rows by verdict, worst first, with the clear pairs that never came near."""
-        found = Counter(row.verdict.value for row in self.rows)
-        found[Verdict.CLEAR.value] += self.work.pairs - len(self.pairs)
-        return {v.value: found[v.value] for v in Verdict if found[v.value]}
+        counts = Counter(row.verdict.value for row in self.rows)
+        counts[Verdict.CLEAR.value] += self.work.pairs - len(self.pairs)
+        return {v.value: counts[v.value] for v in Verdict if counts[v.value]}
 
     @property
     def findings(self) -> tuple[PairResult, ...]:
         """Rows that ask for attention, at rest and in motion, worst first: all but the clear and the allowed ones."""
-        found = [row for row in self.rows if row.verdict not in (Verdict.CLEAR, Verdict.ALLOWED)]
+        rows = [row for row in self.rows if row.verdict not in (Verdict.CLEAR, Verdict.ALLOWED)]
         order = {verdict: k for k, verdict in enumerate(Verdict)}
-        return tuple(sorted(found, key=lambda row: (order[row.verdict], row.distance.upper)))
+        return tuple(sorted(rows, key=lambda row: (order[row.verdict], row.distance.upper)))
 
     def verdict(self, a: str, b: str) -> Verdict:
         """Verdict of a pair at rest, in either order. Raises InputError for unknown names and pairs not asked for."""

@@ -160,8 +160,8 @@ class Scene:
         for name, value in parts.items():
             if not (isinstance(value, (tuple, list)) and len(value) == 2):
                 raise InputError(f"part {shown(name)} must be a pair (shape, T_world), got {shown(value)}")
-        made = tuple(Part(name, as_shape(shape), T) for name, (shape, T) in parts.items())  # type: ignore[arg-type]
-        return cls(made, clearance=clearance, contact=contact)
+        placed = tuple(Part(name, as_shape(shape), T) for name, (shape, T) in parts.items())  # type: ignore[arg-type]
+        return cls(placed, clearance=clearance, contact=contact)
 
     def add(self, part: Part | str, shape: AnyShape | None = None, T_world: ArrayLike | None = None) -> Scene:
         """The scene with one more part: a `Part`, or a name, a shape and a pose (4, 4; the origin by default).
@@ -218,17 +218,17 @@ class Scene:
 
 def name_pairs(name: str, pairs: object) -> list[tuple[str, str]]:
     """Pairs of part names. Raises InputError for anything else."""
-    found = []
+    names = []
     for pair in items(name, pairs, "pairs of part names"):
         two = items(name, pair, "pairs of part names")
         if len(two) != 2:
             raise InputError(f"{name} must be pairs of part names, got {shown(pair)}")
-        found.append((text("part", two[0]), text("part", two[1])))
-    return found
+        names.append((text("part", two[0]), text("part", two[1])))
+    return names
 
 
 def unknown_part(name: str, names: Iterable[str]) -> str:
     """The message for a name that is no part."""
-    known = sorted(names)
-    listed = ", ".join(known[:12]) + (f", ... ({len(known)} in all)" if len(known) > 12 else "")
+    available = sorted(names)
+    listed = ", ".join(available[:12]) + (f", ... ({len(available)} in all)" if len(available) > 12 else "")
     return f"unknown part {shown(name)}; available: {listed or 'none'}"

@@ -102,8 +102,8 @@ class Locator:
             point = self._in_world(deepest(inner_a, inner_b, self.T_ab, inner)[1])
         corners = self._in_world(outer.vertices)
         box = np.array([corners.min(axis=0) - off, corners.max(axis=0) + off])
-        given = any(model.exact is None and not model.between and not model.drawn for model in (self.a, self.b))
-        return Overlap((low, outer.volume + slack), box, given and off == 0.0, point)
+        unknown_error = any(model.exact is None and not model.between and not model.drawn for model in (self.a, self.b))
+        return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
 
     def _exact(self, rough: Overlap | None) -> Overlap | None:
         """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""

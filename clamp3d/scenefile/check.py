@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from clamp3d.checks import shown
-from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
 from clamp3d.engine.check import check as check_scene
@@ -77,7 +76,11 @@ def opened(source: Any) -> Scene | Assembly:
     if isinstance(source, (list, tuple)):
         return Scene(tuple(_part(row) for row in source))
     loaded = source if isinstance(source, Clamp) else load(source)
-    return assemble(loaded) if isinstance(loaded, Clamp) else loaded
+    if not isinstance(loaded, Clamp):
+        return loaded
+    from clamp3d.clamp.assemble import assemble  # SciPy's optimisers, 0.4 s of CPU, only for a clamp
+
+    return assemble(loaded)
 
 
 def _part(row: Any) -> Part:
