@@ -99,7 +99,7 @@ def test_clamp_from_meshes_read_back(run):
 
 
 def test_verdicts_in_a_crowd_are_those_of_measured_distances(pack):
-    scene = pack(10, 5)
+    scene = pack(10)
     result = check(scene)
     full = measured_alike(scene, result)
     assert len(full.pairs) == 10 * 9 // 2
@@ -109,7 +109,7 @@ def test_verdicts_in_a_crowd_are_those_of_measured_distances(pack):
 
 
 def test_many_parts_ask_of_near_pairs_alone(pack):
-    result = check(pack(400, 1))
+    result = check(pack(400))
     assert sum(result.counts.values()) == 400 * 399 // 2
     assert result.work.candidates < 800
     assert sum(result.work.queries.values()) < 20 * result.work.candidates
