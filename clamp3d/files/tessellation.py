@@ -54,20 +54,23 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
     BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
     faces = [*explore(solid, "FACE")]
     form = surfaces_of(faces)
-    corners, numbers, errors = [], [], []
+    corners, triples, numbers, errors = [], [], [], []
+    count = 0
     for k, face in enumerate(faces):
         points, triangles, uv = triangles_of(face, k)
         if not len(triangles):
             continue
         deviation = _deviation(face, form, k, points, triangles, uv)
-        corners.append(points[triangles])
+        corners.append(points)
+        triples.append(triangles + count)
+        count += len(points)
         numbers.append(np.full(len(triangles), k))
         errors.append(np.maximum(deviation, _border_sag(face, points, triangles)))
     if not corners:
         raise Clamp3dError("Open CASCADE makes no triangles of it")
     # Faces that share an edge have the same points on it, so equal coordinates are one vertex.
-    vertices, index = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
-    F = index.reshape(-1, 3)
+    vertices, index = np.unique(np.concatenate(corners), axis=0, return_inverse=True)
+    F = index.reshape(-1)[np.concatenate(triples)]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
