@@ -19,7 +19,7 @@ Where it does not end, finer meshes decide.
 """
 
 
-def _there(function: Callable[_P, _R], seconds: float = 120.0) -> Callable[_P, _R]:
+def _there(function: Callable[_P, _R], seconds: float = 300.0) -> Callable[_P, _R]:
     """The function, answered in the process within so many seconds; a few hundred milliseconds are usual."""
 
     def call(*arguments: _P.args, **_: _P.kwargs) -> _R:
