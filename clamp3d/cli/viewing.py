@@ -18,12 +18,13 @@ from clamp3d.cli.options import Viewing
 from clamp3d.cli.progress import bar, narrated
 from clamp3d.cli.terminal import show
 from clamp3d.engine.check import check
-from clamp3d.engine.model import ModelCache
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.output.files import STDOUT
-from clamp3d.output.viewer import MEASURED, Viewer
+from clamp3d.output.serving import MeshcatServer, PageServer
+from clamp3d.output.viewer import Viewer
 from clamp3d.output.viewer_overlay import overlay
+from clamp3d.output.viewer_story import ClampStory
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Page:
         if not as_published(parse_sequence(settings.get("sequence", clamp.sequence))):
             finished = narrated(clamp, model, settings, self.quiet)
         overlays = dict(overlay(clamp, text) for text in self.viewing.overlays)
-        with self._viewer(clamp, model=model, clearance=self.viewing.clearance, overlays=overlays) as viewer:
+        with self._viewer(ClampStory(clamp, model, self.viewing.clearance), overlays) as viewer:
             run = finished or narrated(clamp, model, settings, self.quiet, viewer.show)
             viewer.finish(run)
             self._save(viewer)
@@ -58,22 +59,18 @@ class Page:
         return run
 
     def check(self, scene: Scene) -> CheckResult:
-        """Check a scene on the page."""
+        """Check a scene on the page, where somebody may be looking: each verdict goes there as it comes."""
         if self.viewing.clearance is not None:
             scene = replace(scene, clearance=self.viewing.clearance)
         with self._viewer(scene) as viewer:
-            cache = ModelCache()
             with bar(self.quiet) as report:
-                if viewer.url is not None:  # somebody may be looking: verdicts first
-                    still = replace(scene, motions=())
-                    viewer.preview(check(still, depths=False, progress=report, cache=cache))
-                result = check(scene, distances=len(scene.parts) <= MEASURED, progress=report, cache=cache)
+                result = check(scene, progress=report, on_row=viewer.show_row if viewer.url is not None else None)
             viewer.finish(result)
             self._save(viewer)
         return result
 
     @contextlib.contextmanager
-    def _viewer(self, shown: Clamp | Scene, **settings: Any) -> Iterator[Viewer]:
+    def _viewer(self, shown: ClampStory | Scene, overlays: dict[str, Any] | None = None) -> Iterator[Viewer]:
         """A viewer as the options say; its page is served on when the work is done."""
         viewing = self.viewing
         serve = self.serve and viewing.url is None
@@ -81,12 +78,16 @@ class Page:
             raise click.UsageError("--open goes with a page that is served, not with --html alone")
         if viewing.url is not None and (viewing.port is not None or viewing.timeout is not None):
             raise click.UsageError("--port and --timeout go with a page served here, not with --url")
-        settings |= {"serve": serve, "url": viewing.url, "host": viewing.host, "port": viewing.port}
-        with Viewer(shown, mesh_error=viewing.draw_error, **settings) as viewer:
-            if viewer.url is not None:
-                show(viewer.url)
+        server: PageServer | MeshcatServer | None = None
+        if viewing.url is not None:
+            server = MeshcatServer(viewing.url)
+        elif serve:
+            server = PageServer(viewing.host, viewing.port)
+        with Viewer(shown, server, mesh_error=viewing.draw_error, overlays=overlays) as viewer:
+            if server is not None:
+                show(server.url)
                 if viewing.open_browser:
-                    click.launch(viewer.url)
+                    click.launch(server.url)
             yield viewer
             if serve:
                 with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; the result decides the exit code

@@ -1,4 +1,4 @@
-"""The shared body of two parts, and parts cut open, as pages and pictures show them: meshes, by manifold3d."""
+"""The shared body of two parts as pages, pictures and files show it: a mesh, by manifold3d."""
 
 from __future__ import annotations
 
@@ -8,28 +8,6 @@ import numpy as np
 import trimesh
 
 from clamp3d.geometry.pose import Array, inverse
-
-
-def cut_open(
-    mesh: trimesh.Trimesh, T_world: Array, y: float = 0.0
-) -> tuple[trimesh.Trimesh | None, trimesh.Trimesh | None]:
-    """What of a part at ``T_world`` lies behind the world's plane Y = ``y``: without and with nothing but the cut face.
-
-    Both in the part's frame; None for what is empty.
-    """
-    normal = T_world[:3, :3].T @ [0.0, 1.0, 0.0]
-    offset = y - float(T_world[1, 3])
-    behind = _mesh(_manifold(mesh).trim_by_plane(tuple(normal), offset))
-    if behind is None:
-        return None, None
-    height = behind.vertices @ normal - offset
-    on_cut = (np.abs(height[behind.faces]) < 1e-9 * (1.0 + np.abs(behind.vertices).max())).all(axis=1)
-    pieces = []
-    for chosen in (~on_cut, on_cut):
-        piece = trimesh.Trimesh(behind.vertices, behind.faces[chosen], process=False)
-        piece.remove_unreferenced_vertices()
-        pieces.append(piece if chosen.any() else None)
-    return pieces[0], pieces[1]
 
 
 def overlap(a: trimesh.Trimesh, T_a: Array, b: trimesh.Trimesh, T_b: Array) -> trimesh.Trimesh | None:

@@ -26,7 +26,7 @@ VERDICT_COLOURS: dict[str, str] = {
     "duplicate": "#D32F2F",
     "contact": "#F2B705",
     "allowed": "#F2B705",
-    "clearance": "#00A6C0",
+    "clearance": "#0088CC",
     "clear": "#8A8F98",
     "uncertain": "#8A8F98",
     "failed": "#D32F2F",

@@ -1,23 +1,32 @@
-"""Where a scene goes: a page served by the standard library's web server, or a meshcat server that is running."""
+"""Where a scene goes: a page served by tornado, as meshcat's own is, or a meshcat server that is running.
+
+Meshcat's server cannot do what the page needs: it has one fixed page, listens on every address of the machine, and
+answers no questions.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import errno
 import io
 import ipaddress
 import socket
 import threading
-from collections.abc import Callable
-from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
 import umsgpack
 import zmq
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from clamp3d.checks import shown, text, whole
+from clamp3d.checks import text, whole
 from clamp3d.errors import Clamp3dError, InputError
 
 PORT, PORTS = 7000, 200
@@ -25,6 +34,7 @@ PORT, PORTS = 7000, 200
 _TIMEOUT = 10.0  # s for an answer of a meshcat server
 
 Command = dict[str, Any]
+Answer = Callable[[Mapping[str, str]], dict[str, Any]]
 
 
 class CommandLog:
@@ -42,18 +52,21 @@ class CommandLog:
     def __init__(self) -> None:
         self._messages: dict[tuple[str, str, str], bytes] = {}
 
-    def add(self, command: Command) -> None:
-        """Keep ``command`` as a message (msgpack) that our page reads."""
+    def add(self, command: Command) -> list[bytes]:
+        """Keep ``command``; the new messages (msgpack) that our page reads."""
+        new = []
         if command["type"] == "set_object":
             command = command | {"object": dict(command["object"])}
             for geometry in command["object"].pop("geometries"):
-                data = {"type": "set_geometry", "path": geometry["uuid"], "geometry": geometry}
-                key = (data["type"], data["path"], "")
+                key = ("set_geometry", geometry["uuid"], "")
                 if key not in self._messages:
+                    data = {"type": "set_geometry", "path": geometry["uuid"], "geometry": geometry}
                     self._messages[key] = umsgpack.packb(data)
+                    new.append(self._messages[key])
         key = (command["type"], command["path"], command.get("property", ""))
         self._messages.pop(key, None)
         self._messages[key] = umsgpack.packb(command)
+        return [*new, self._messages[key]]
 
     def messages(self) -> list[bytes]:
         """All messages that build the scene, oldest first."""
@@ -61,59 +74,112 @@ class CommandLog:
 
 
 class PageServer:
-    """Serves what ``page()`` returns at ``url``, in a thread, until it is closed.
+    """Serves a page at ``url``, in a thread, until it is closed: the page itself, its commands, and its questions.
 
     A request under a foreign name is refused: a page elsewhere whose name is pointed here may not read along.
     Raises InputError if a ``port`` that was named, or every port from 7000 on, is taken, or ``host`` is not ours.
     """
 
-    def __init__(self, page: Callable[[], str], *, host: str = "127.0.0.1", port: int | None = None) -> None:
-        own_names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
-
-        class Handler(BaseHTTPRequestHandler):
-            def do_GET(self) -> None:
-                name = urlsplit(f"//{self.headers.get('Host', '')}").hostname or ""
-                if name not in own_names and not _is_address(name):
-                    self.send_error(HTTPStatus.FORBIDDEN)
-                elif self.path not in ("/", "/index.html"):
-                    self.send_error(HTTPStatus.NOT_FOUND)
-                else:
-                    content = page().encode("utf-8", "backslashreplace")
-                    self.send_response(HTTPStatus.OK)
-                    for key, value in (("Content-Type", "text/html; charset=utf-8"), ("Cache-Control", "no-store")):
-                        self.send_header(key, value)
-                    self.send_header("Content-Length", str(len(content)))
-                    self.end_headers()
-                    with contextlib.suppress(ConnectionError):
-                        self.wfile.write(content)
-
-            def log_message(self, *_: object) -> None:
-                pass
-
-        self._server = _bind(Handler, host, port)
-        self.port: int = self._server.server_address[1]
+    def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
+        self.names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
+        self._sockets = _bind(host, port)
+        self.port: int = self._sockets[0].getsockname()[1]
         self.url = f"http://{host}:{self.port}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), name="clamp3d viewer")
+        self.pages: set[WebSocketHandler] = set()
+        self.work = ThreadPoolExecutor(1, "clamp3d viewer")
+        self._loop, self._closed = asyncio.new_event_loop(), asyncio.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self, page: Callable[[], str], messages: Callable[[], list[bytes]], answer: Answer) -> None:
+        """Serve ``page()``, which gets ``messages()`` and all that follow, and whose questions ``answer`` answers."""
+        handlers: list[tuple[str, Any, dict[str, Any]]] = [
+            ("/", _Page, {"server": self, "page": page, "messages": messages}),
+            ("/answer", _Answer, {"server": self, "answer": answer}),
+        ]
+        serving = self._serve(Application(handlers, log_function=lambda handler: None))
+        self._thread = threading.Thread(target=self._loop.run_until_complete, args=(serving,), name="clamp3d viewer")
         self._thread.daemon = True
         self._thread.start()
 
+    async def _serve(self, application: Application) -> None:
+        server = HTTPServer(application)
+        server.add_sockets(self._sockets)
+        await self._closed.wait()
+        server.stop()
+        for page in self.pages.copy():
+            page.close()
+        await server.close_all_connections()
+
+    def send(self, messages: list[bytes]) -> None:
+        """Pass messages on to the pages that are open."""
+        if self._thread is not None:
+            self._loop.call_soon_threadsafe(self._broadcast, messages)
+
+    def _broadcast(self, messages: list[bytes]) -> None:
+        for page in self.pages.copy():
+            with contextlib.suppress(WebSocketClosedError):
+                for message in messages:
+                    page.write_message(message, binary=True)
+
     def close(self) -> None:
         """Stop listening and end the thread. A second call does nothing."""
-        if self._thread.is_alive():
-            self._server.shutdown()
+        if self._thread is not None:
+            self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join()
-            self._server.server_close()
-
-    def __enter__(self) -> PageServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+            self.work.shutdown(cancel_futures=True)
+            self._thread = None
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    allow_reuse_address = False
+class _Handler(RequestHandler):
+    """Refuses requests under a foreign name."""
+
+    def prepare(self) -> None:
+        name = urlsplit(f"//{self.request.headers.get('Host', '')}").hostname or ""
+        if name not in self.own_server.names and not _is_address(name):
+            raise HTTPError(403)
+
+    def initialize(self, server: PageServer, **functions: Callable[..., Any]) -> None:
+        self.own_server = server
+        self.__dict__.update(functions)
+
+
+class _Page(_Handler, WebSocketHandler):
+    """The page, and its commands at the same address, where meshcat's viewer looks for them."""
+
+    page: Callable[[], str]
+    messages: Callable[[], list[bytes]]
+
+    async def get(self) -> None:
+        if self.request.headers.get("Upgrade", "").lower() == "websocket":
+            await super().get()
+        else:
+            self.set_header("Cache-Control", "no-store")
+            self.finish(self.page().encode("utf-8", "backslashreplace"))
+
+    def open(self) -> None:
+        for message in self.messages():
+            self.write_message(message, binary=True)
+        self.own_server.pages.add(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        pass
+
+    def on_close(self) -> None:
+        self.own_server.pages.discard(self)
+
+
+class _Answer(_Handler):
+    """What a page asks while somebody looks at it, one question after the other."""
+
+    answer: Answer
+
+    async def get(self) -> None:
+        query = {key: self.get_argument(key) for key in self.request.arguments}
+        try:
+            self.write(await asyncio.get_running_loop().run_in_executor(self.own_server.work, self.answer, query))
+        except Clamp3dError as error:
+            self.set_status(400)
+            self.write({"error": str(error)})
 
 
 def _is_address(name: str) -> bool:
@@ -122,22 +188,20 @@ def _is_address(name: str) -> bool:
     return False
 
 
-def _bind(handler: type[BaseHTTPRequestHandler], host: str, port: int | None) -> ThreadingHTTPServer:
-    """A server on ``port``, or on the first free one. Raises InputError if there is none."""
+def _bind(host: str, port: int | None) -> list[socket.socket]:
+    """Sockets on ``port``, or on the first free one. Raises InputError if there is none."""
     if port is not None:
         whole("port", port, least=0, most=65535)
-    try:
-        socket.getaddrinfo(host or "(none)", None)
-    except (OSError, ValueError):
-        raise InputError(f"host must be the name or an address of this machine, got {shown(host)}") from None
     for candidate in range(PORT, PORT + PORTS) if port is None else (port,):
         try:
-            return _Server((host, candidate), handler)
-        except (OSError, OverflowError) as error:
+            return bind_sockets(candidate, host or "(none)")
+        except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
-    if port is None:
-        raise InputError(f"no free port for the viewer on {host} from {PORT} to {PORT + PORTS - 1}: {reason}")
-    raise InputError(f"cannot serve the viewer on {host} port {port}: {reason}; leave --port out to take a free one")
+            if getattr(error, "errno", None) != errno.EADDRINUSE:
+                break
+    where = f"from {PORT} to {PORT + PORTS - 1}" if port is None else f"port {port}"
+    advice = "" if port is None else "; leave --port out to take a free one"
+    raise InputError(f"cannot serve the viewer on {host!r} {where}: {reason}{advice}")
 
 
 class MeshcatServer:
@@ -149,16 +213,15 @@ class MeshcatServer:
     def __init__(self, zmq_url: str) -> None:
         from meshcat.visualizer import ViewerWindow
 
-        if not zmq_url.startswith(("tcp://", "ipc://")):
+        if not text("url", zmq_url).startswith(("tcp://", "ipc://")):
             raise InputError(f"--url must be the zmq_url that meshcat-server prints (tcp://HOST:PORT), got {zmq_url!r}")
         ViewerWindow.context.RCVTIMEO = ViewerWindow.context.SNDTIMEO = int(1000 * _TIMEOUT)
         ViewerWindow.context.LINGER = 0
-        self._zmq_url = zmq_url
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 self._window = ViewerWindow(zmq_url, start_server=False, server_args=[])
         except zmq.Again:
-            raise self._silent() from None
+            raise Clamp3dError(f"no meshcat server answers at {zmq_url} (waited {_TIMEOUT:g} s)") from None
         except zmq.ZMQError as error:
             raise InputError(f"--url {zmq_url}: {error}") from None
         self.url: str = self._window.web_url
@@ -167,8 +230,5 @@ class MeshcatServer:
         """Pass a command on. Raises Clamp3dError if the server has gone."""
         try:
             self._window.send(SimpleNamespace(lower=lambda: command))
-        except zmq.ZMQError:
-            raise self._silent() from None
-
-    def _silent(self) -> Clamp3dError:
-        return Clamp3dError(f"no meshcat server answers at {self._zmq_url} (waited {_TIMEOUT:g} s)")
+        except zmq.ZMQError as error:
+            raise Clamp3dError(f"the meshcat server at {self.url} does not answer any more: {error}") from None

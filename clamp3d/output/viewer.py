@@ -12,168 +12,148 @@ import base64
 import itertools
 import math
 import threading
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from clamp3d import __version__
-from clamp3d.baselines.model import ContactModel
-from clamp3d.checks import flag, instance, text
-from clamp3d.clamp.dimensions import Clamp
+from clamp3d.checks import instance, number
 from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.result import Assembly, Finding, Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.engine.check import check
-from clamp3d.engine.distance import measure
-from clamp3d.engine.model import ModelCache
-from clamp3d.engine.result import CheckResult, PairResult
+from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output.files import write_text
-from clamp3d.output.groups import grouped
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
-from clamp3d.output.viewer_scene import ROOT, Command, Pieces, SceneDrawing, focus
-from clamp3d.output.viewer_timeline import FIRST, UNCUT, ClampStory, Row, Stop, distance_curves, scene_stops
-from clamp3d.output.wording import (
-    circumstances,
-    distance_text,
-    group_sentence,
-    headline,
-    meaning,
-    sentence,
-    severity,
-    titles,
-    worst_first,
-)
+from clamp3d.output.viewer_scene import Command, Pieces, SceneDrawing
+from clamp3d.output.viewer_story import LISTED, ClampStory, SceneStory, Stop, findings_of, focus, worst_pairs
+from clamp3d.output.wording import counted, distance_text, headline, meaning, severity, titles
 from clamp3d.scenefile.check import opened
 
-CLEARANCE = 5.0
-"""Gap in mm from which two parts of a clamp count as clear."""
-_LISTED = 500
-"""Rows of a table on the page; a result's JSON has all."""
 _SEVERITY = {"error": "clash", "warning": "contact"}
 """The verdict whose colour a finding of an assembly has."""
-MEASURED = 40
-"""Scenes of up to so many parts are measured pair by pair, larger ones only as far as their verdicts need."""
-
-Shown: TypeAlias = Clamp | Scene | Assembly | CheckResult
+_CURVES = 4
+"""Findings in motions whose distance curves a saved page holds; a served page asks for any."""
+_UNCUT = ("P4", "P5")
+"""Bolts and nuts are not cut lengthwise in drawings (ISO 128)."""
+_PAUSE = 0.5
+"""Seconds between two looks at a check that is running."""
 
 
 class Viewer:
-    """Shows a clamp or a scene at ``url`` from the start; `show` adds a waypoint, `finish` the result.
+    """Shows a clamp or a scene from the start; `show` adds a waypoint, `show_row` a verdict, `finish` the result.
 
     Parameters
     ----------
-    shown : Clamp, Scene, Assembly or CheckResult
-        What to draw. `view` also shows the result.
-    model : ContactModel, optional
-        How grooves are measured; by default exactly.
+    shown : Scene or ClampStory
+        What to draw.
+    server : PageServer or MeshcatServer, optional
+        Where; without, the page is only kept for `save_html`. No browser is opened, and none is waited for.
     mesh_error : float
         Chord error of the drawn facets, mm. What is measured is not measured on them.
-    clearance : float, optional
-        Gap that counts as clear, mm; by default the scene's own, and 5 mm for a clamp.
     overlays : dict, optional
         Convex pieces of parts to show as well, by a name: ``{name: {part: [trimesh.Trimesh, ...]}}``.
-    serve : bool
-        Serve the page on this machine (``host``, ``port``: the first free one from 7000); else it is only kept for
-        `save_html`. No browser is opened, and none is waited for.
-    url : str, optional
-        A running meshcat server to show the scene on: its zmq_url.
 
     Raises
     ------
     InputError
-        For a bad mesh error, clearance, address or port.
+        For a bad mesh error.
     """
 
     def __init__(
         self,
-        shown: Shown,
+        shown: Scene | ClampStory,
+        server: PageServer | MeshcatServer | None = None,
         *,
-        model: ContactModel | None = None,
         mesh_error: float = 0.01,
-        clearance: float | None = None,
         overlays: Mapping[str, Pieces] | None = None,
-        serve: bool = True,
-        url: str | None = None,
-        host: str = "127.0.0.1",
-        port: int | None = None,
     ) -> None:
-        overlays = {} if overlays is None else overlays
-        instance("overlays", overlays, Mapping)
-        for name, pieces in overlays.items():
-            instance(f"overlay {text('name of an overlay', name)}", pieces, Mapping)
-        serve = flag("serve", serve)
-        self._model, self._mesh_error = model, mesh_error
-        clamp = shown if isinstance(shown, Clamp) else getattr(shown, "clamp", None)
-        wide = CLEARANCE if clearance is None else clearance
-        self._clamp = None if clamp is None else ClampStory(clamp, model, wide)
-        self._scene = self._clamp.scene if self._clamp is not None else _scene(shown, clearance)
-        self._cache, self._log = ModelCache(), CommandLog()
-        self._waypoints: list[Waypoint] = []
-        self._story: dict[str, Any] = {}
+        self._source = shown if isinstance(shown, ClampStory) else SceneStory(shown)
+        self._server, self._log = server, CommandLog()
+        self._mesh_error, self._overlays = mesh_error, list(overlays or {})
+        self._rows: dict[tuple[str, str], PairResult] = {}
+        self._looked = -math.inf
         self._panel = ""
-        self._meshcat = None if url is None else MeshcatServer(text("url", url))
-        self._server: PageServer | None = None
+        anchors = self._source.anchors
         self._drawing = SceneDrawing(
-            self._scene,
-            self._send,
-            mesh_error=mesh_error,
-            cut_y=0.0 if self._clamp is not None else _cut(self._scene),
-            uncut=UNCUT if self._clamp is not None else (),
-            anchors=None if self._clamp is None else self._clamp.anchors,
-            overlays=overlays,
+            self._source.scene, self._send, mesh_error=mesh_error, anchors=anchors, overlays=overlays
         )
-        self._set_story("waiting for the first state", state="waiting")
-        if url is None and serve:
-            self._server = PageServer(self.html, host=host, port=port)
+        self.story: dict[str, Any] = {}
+        """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
+        self._tell("waiting for the first state" if isinstance(shown, ClampStory) else "checking ...", "waiting")
+        if isinstance(server, PageServer):
+            server.start(lambda: self._page([]), self._log.messages, self.answer)
 
     @property
     def url(self) -> str | None:
         """Where to look with a browser; None if nothing is served."""
-        server = self._meshcat or self._server
-        return None if server is None else server.url
-
-    @property
-    def story(self) -> dict[str, Any]:
-        """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
-        return self._story
+        return None if self._server is None else self._server.url
 
     def show(self, waypoint: Waypoint) -> None:
         """Show a waypoint of the clamp as it is reached: pass this as ``on_waypoint`` of `assemble`."""
         instance("waypoint", waypoint, Waypoint)
-        if self._clamp is None:
+        if not isinstance(self._source, ClampStory):
             raise InputError("show() goes with the viewer of a clamp; a scene is shown by finish(check(scene))")
-        self._waypoints.append(waypoint)
-        self._drawing.show(self._clamp.stop(waypoint))
-        self._drawing.dimension(len(self._waypoints) - 1, "splints", *self._clamp.opening(waypoint))
-        self._set_story(f"{waypoint.step}: {waypoint.label}", state="running")
+        self._drawing.show(self._source.stop(waypoint))
+        self._tell(f"{waypoint.step}: {waypoint.label}", "running")
 
-    def preview(self, result: CheckResult) -> None:
-        """Show the findings at rest while depths and motions are still measured."""
-        instance("result", result, CheckResult)
-        findings = self._scene_findings(result)
-        self._set_story(f"{headline(result)}; depths and motions follow", state="running", findings=findings)
+    def show_row(self, row: PairResult) -> None:
+        """Show a verdict at rest as it comes: pass this as ``on_row`` of `check`."""
+        self._rows[row.a, row.b] = row
+        if time.monotonic() > self._looked + _PAUSE and any(row.verdict in BAD for row in self._rows.values()):
+            work = Work(0, 0, len(self._rows), 0, 0, 0, 0, 0, {}, {}, {})
+            so_far = CheckResult(self._source.scene, tuple(self._rows.values()), (), None, work)
+            findings = [self._with_margin(f) for f in findings_of(so_far, self._drawing.timeline, brief=True)]
+            self._tell(f"So far: {headline(so_far)}; the check is running", "running", findings=findings[:LISTED])
+            self._looked = time.monotonic()
 
     def finish(self, result: Assembly | CheckResult) -> None:
         """Show the result, and play the whole time line once."""
-        shown = self._finish_assembly(result) if isinstance(result, Assembly) else self._finish_check(result)
-        self._drawing.play()
-        self._set_story(**shown, done=True)
+        instance("result", result, Assembly, CheckResult)
+        shown = self._assembly(result) if isinstance(result, Assembly) else self._check(result)
+        self._drawing.play(self._accuracy)
+        self._tell(**shown, done=True)
+
+    def answer(self, query: Mapping[str, str]) -> dict[str, Any]:
+        """How pairs stand at a moment of the time line, as the page asks: ``time`` in s; the pair ``a``, ``b``, or all.
+
+        Raises InputError for what is no time or no part.
+        """
+        if not self.story["done"]:
+            raise InputError("the check is still running")
+        try:
+            seconds = number("time", float(query["time"]))
+        except (KeyError, ValueError):
+            raise InputError(f"time must be a number of seconds, got {query.get('time')!r}") from None
+        stop, poses = self._drawing.timeline.at(seconds)
+        pairs = [(query["a"], query.get("b", ""))] if "a" in query else stop.pairs
+        return {"rows": [row.data() for row in self._source.measure(poses, pairs)]}
 
     def html(self) -> str:
         """The scene with its animation as one HTML page that needs neither server nor network."""
+        curves: dict[int, list[dict[str, Any]]] = {}
+        for k, finding in enumerate(self.story["findings"]):
+            if finding["moments"] and len(curves) < _CURVES:
+                pair = {"a": finding["a"], "b": finding["b"]}
+                curves[k] = [self.answer(pair | {"time": str(s)})["rows"][0] for s in finding["moments"]]
+        self.story["curves"] = {
+            str(k): [[row["at_least_mm"], row["at_most_mm"]] for row in rows] for k, rows in curves.items()
+        }
+        self._send_story()
+        return self._page(self._log.messages())
+
+    def _page(self, messages: list[bytes]) -> str:
         return render(
             "viewer.html",
-            title=self._story["title"],
+            title=self.story["title"],
             panel=self._panel,
-            done=self._story["done"],
-            messages=[base64.b64encode(message).decode("ascii") for message in self._log.messages()],
+            done=self.story["done"],
+            messages=[base64.b64encode(message).decode("ascii") for message in messages],
             **_meshcat_script(),
         )
 
@@ -187,7 +167,7 @@ class Viewer:
 
     def close(self) -> None:
         """Stop serving the page; a meshcat server keeps the scene. A second call does nothing."""
-        if self._server is not None:
+        if isinstance(self._server, PageServer):
             self._server.close()
 
     def __enter__(self) -> Viewer:
@@ -197,135 +177,120 @@ class Viewer:
         self.close()
 
     def _send(self, command: Command) -> None:
-        self._log.add(command)
-        if self._meshcat is not None:
-            self._meshcat.send(command)
+        messages = self._log.add(command)
+        if isinstance(self._server, PageServer):
+            self._server.send(messages)
+        elif self._server is not None and command["type"] != "set_story":
+            self._server.send(command)
 
-    def _finish_assembly(self, run: Assembly) -> dict[str, Any]:
+    def _send_story(self) -> None:
+        self._send({"type": "set_story", "path": "", "value": self.story | {"panel": self._panel}})
+
+    def _assembly(self, run: Assembly) -> dict[str, Any]:
         """What the page says of an assembly."""
-        for waypoint in run.path[len(self._waypoints) :]:
+        for waypoint in run.path[len(self._drawing.timeline.stops) :]:
             self.show(waypoint)
         forces = [force for force in run.forces if force.feature != HELD]
-        self._drawing.forces(len(self._waypoints) - 1, forces)
+        self._drawing.forces(forces)
         worst = {finding.severity for finding in run.findings}
-        state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
-        grave = [finding for finding in run.findings if finding.severity != "note"]
+        number, stop = len(run.path) - 1, self._drawing.timeline.stops[-1]
+        findings = []
+        for k, finding in enumerate(f for f in run.findings if f.severity != "note"):
+            # The place to look at is where the pair that it names is at the end, else the whole clamp.
+            row = next((row for row in stop.rows if (row.a, row.b) == (finding.a, finding.b)), None)
+            low, high = self._drawing.extent(stop.poses) if row is None else focus(row.distance)
+            words = {"title": finding.text, "text": finding.text, "detail": "", "group": str(k), "moments": []}
+            pair = {"a": finding.a or "", "b": finding.b or "", "verdict": _SEVERITY[finding.severity]}
+            findings.append(self._with_margin(pair | words | {"stop": number, "low": low, "high": high}))
         return {
             "text": run.status,
-            "state": state,
+            "state": "found" if "error" in worst else "note" if "warning" in worst else "clean",
             "assembly": run,
             "forces": forces,
-            "findings": [self._assembly_finding(k, finding) for k, finding in enumerate(grave)],
+            "findings": findings,
             "notes": [finding.text for finding in run.findings if finding.severity == "note"],
         }
 
-    def _finish_check(self, result: CheckResult) -> dict[str, Any]:
+    def _check(self, result: CheckResult) -> dict[str, Any]:
         """What the page says of a checked scene."""
-        instance("result", result, CheckResult)
-        for stop in scene_stops(result, self._rows):
+        assert isinstance(self._source, SceneStory)
+        for stop in self._source.stops(result):
             self._drawing.show(stop)
+        findings = itertools.islice(findings_of(result, self._drawing.timeline), LISTED)
         return {
             "text": headline(result),
             "state": severity(result),
-            "findings": self._scene_findings(result),
-            "curves": list(distance_curves(result, self._drawing.timeline.stops, self._rows)),
-            "pairs": worst_first(result.pairs)[:_LISTED],
-            "motions": worst_first(result.motions)[:_LISTED],
+            "findings": [self._with_margin(finding) for finding in findings],
+            "pairs": worst_pairs(result.pairs),
+            "motions": worst_pairs(result.motions),
             "notes": [*result.scene.notes, *work_text(result.work)],
         }
 
-    def _rows(self, scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[Row]:
-        """Pairs of a scene as rows, by the engine that every command uses."""
-        return [Row.of(scene, *pair, d) for pair, d in measure(scene, pairs, cache=self._cache).items()]
-
-    def _assembly_finding(self, index: int, finding: Finding) -> dict[str, Any]:
-        """A finding with the place to look at: where the pair that it names is at the end, else the whole clamp."""
-        number = len(self._waypoints) - 1
-        stop = self._drawing.timeline.stops[number]
-        row = next((row for row in stop.rows if (row.a, row.b) == (finding.a, finding.b)), None)
-        data = {"a": finding.a or "", "b": finding.b or "", "verdict": _SEVERITY[finding.severity]}
-        data |= {"group": str(index), "title": finding.text, "text": finding.text, "detail": ""}
-        return data | self._place(number, self._drawing.extent([stop.poses]) if row is None else focus(row.distance))
-
-    def _scene_findings(self, result: CheckResult) -> list[dict[str, Any]]:
-        """The findings of a check by groups, each with the stop and the place to look at."""
-        names, stops = titles(result.scene), self._drawing.timeline.stops
-        meetings = {k: self._drawing.mark_meeting(k) for k, stop in enumerate(stops) if stop.halts}
-        findings: list[dict[str, Any]] = []
-        for group in grouped(result):
-            for row in group.rows[: max(0, _LISTED - len(findings))]:
-                number = self._stop_of(row)
-                data = {"a": row.a, "b": row.b, "motion": row.motion, "verdict": row.verdict.value, "group": group.id}
-                data |= {"title": group_sentence(group, names), "text": sentence(row, names)}
-                data["detail"] = circumstances(row)
-                findings.append(data | self._place(number, meetings.get(number) or focus(row.distance)))
-        return findings
-
-    def _stop_of(self, row: PairResult) -> int:
-        """The stop that shows a finding: of one in a motion its first contact, else the motion's end."""
-        stops = self._drawing.timeline.stops
-        of_motion = [k for k, stop in enumerate(stops) if row.motion and stop.step == row.motion]
-        first = [k for k in of_motion if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stops[k].rows)]
-        return [*first, *of_motion[-1:], 0][0]
-
-    def _place(self, stop: int, box: tuple[Array, Array]) -> dict[str, Any]:
+    def _with_margin(self, finding: dict[str, Any]) -> dict[str, Any]:
+        """A finding with some room around its place: what its parts share, else where they are nearest."""
+        place = (finding["stop"], finding["a"], finding["b"])
+        low, high = self._drawing.shared.get(place, (finding["low"], finding["high"]))
         margin = 0.1 * self._drawing.size
-        return {"stop": stop, "low": (box[0] - margin).tolist(), "high": (box[1] + margin).tolist()}
+        return finding | {"low": (low - margin).tolist(), "high": (high + margin).tolist()}
 
-    def _set_story(self, text: str, *, state: str, done: bool = False, **more: Any) -> None:
-        """Set what the page beside the picture shows; meshcat's own page takes no notice of it."""
-        scene, drawing, clamp = self._scene, self._drawing, self._clamp
-        accuracy = self._accuracy()
-        drawing.caption(accuracy)
-        self._story = {
-            "title": scene.name if clamp is None else clamp.title,
+    @property
+    def _accuracy(self) -> str:
+        """How exact the picture and its numbers are."""
+        facets = f"Drawn with facets within {self._mesh_error:g} mm, those of files as they are."
+        return f"{facets} {self._source.accuracy}"
+
+    def _tell(self, text: str, state: str, *, done: bool = False, **more: Any) -> None:
+        """Set what the page beside the picture shows."""
+        source, drawing = self._source, self._drawing
+        stops = [_stop_data(stop, drawing) for stop in drawing.timeline.stops]
+        self.story = {
+            "title": source.title,
             "headline": text,
             "done": done,
-            "stops": [_stop_data(stop, *drawing.extent([stop.poses])) for stop in drawing.timeline.stops],
+            "stops": stops,
             "findings": more.get("findings", []),
-            "curves": more.get("curves", []),
+            "curves": {},
             "forces": [force.to_dict() for force in more.get("forces", ())],
-            "nodes": {part.name: drawing.paths(part.name) for part in scene.parts},
-            "overlays": [{"name": name, "path": f"{ROOT}/overlay {name}"} for name in drawing.overlays],
-            "cut": drawing.cut,
-            "cut_open": clamp is not None,
+            "paths": drawing.paths,
+            "overlays": self._overlays,
+            "uncut": None if source.anchors is None else _UNCUT,
             "facets": self._mesh_error,
-            "frame": drawing.frame() if drawing.timeline.stops else None,
+            "frame": drawing.framed(),
         }
-        used = {row["verdict"] for stop in self._story["stops"] for row in stop["rows"]}
+        numbered = enumerate(self.story["findings"])
+        used = {row["verdict"] for stop in stops for row in stop["rows"]}
         context = {
-            "subtitle": "" if clamp is None else clamp.subtitle,
-            "scene": scene,
+            "subtitle": source.subtitle,
+            "scene": source.scene,
             "state": state,
-            "accuracy": accuracy,
-            "parts": titles(scene),
+            "accuracy": self._accuracy,
+            "parts": titles(source.scene),
             "part_colours": drawing.colours,
             "colours": VERDICT_COLOURS,
             "force_colour": FORCE,
             "force_length": drawing.force_length,
-            "meanings": {name: meaning(name, scene) for name in VERDICT_COLOURS if name in used},
+            "meanings": {name: meaning(name, source.scene) for name in VERDICT_COLOURS if name in used},
+            "groups": [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])],
             "version": __version__,
             "gap": distance_text,
+            "counted": counted,
             "degrees": math.degrees,
         }
-        numbered = enumerate(self._story["findings"])
-        context["groups"] = [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])]
         missing = {"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()}
-        self._panel = render("viewer.panel.html", **(self._story | missing | context | more))
-        drawing.property(ROOT, "story", self._story | {"panel": self._panel})
-
-    def _accuracy(self) -> str:
-        """How exact the picture and its numbers are."""
-        if any(isinstance(part.shape, MeshShape) for part in self._scene.parts):
-            return (
-                f"Files are drawn with their own facets, other parts within {self._mesh_error:g} mm of their faces. "
-                "How each distance was measured stands beside it."
-            )
-        measured = "exactly" if self._model is None or self._model.name == "cas" else f"by {self._model.name}"
-        return f"Drawn with facets within {self._mesh_error:g} mm; measured {measured}, not on the facets."
+        self._panel = render("viewer.panel.html", **(self.story | missing | context | more))
+        self._send_story()
 
 
-def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
+def view(
+    shown: Any,
+    *,
+    serve: bool = True,
+    url: str | None = None,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    mesh_error: float = 0.01,
+    overlays: Mapping[str, Pieces] | None = None,
+) -> Viewer:
     """Show a scene, checked, with its motions, or an assembly, in a browser or as a page.
 
     Parameters
@@ -334,7 +299,11 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
         A result of `check` or `assemble`, or what `check` takes: a scene is checked first, a clamp assembled.
     serve : bool
         Serve the page at ``viewer.url`` until ``viewer.close()``.
-    **options
+    url : str, optional
+        A running meshcat server to show the scene on: its zmq_url.
+    host, port
+        Where to serve: on this machine, on the first free port from 7000 on.
+    mesh_error, overlays
         As for `Viewer`.
 
     Returns
@@ -345,7 +314,7 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
     Raises
     ------
     InputError
-        For what cannot be read, and as `Viewer`.
+        For what cannot be read, a bad mesh error, address or port.
 
     Examples
     --------
@@ -355,16 +324,14 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
     ...     viewer.story["findings"][0]["verdict"]
     'contained'
     """
-    if not isinstance(shown, CheckResult):
-        shown = opened(shown)
-    if isinstance(shown, Scene):
-        scene = _scene(shown, options.pop("clearance", None))
-        shown = check(scene, distances=len(scene.parts) <= MEASURED)
-    if isinstance(shown, Assembly):
-        options.setdefault("model", shown.model)
-    viewer = Viewer(shown, serve=serve, **options)
+    result = shown if isinstance(shown, CheckResult) else opened(shown)
+    if isinstance(result, Scene):
+        result = check(result)
+    source = ClampStory(result.clamp, result.model) if isinstance(result, Assembly) else result.scene
+    server = MeshcatServer(url) if url is not None else PageServer(host, port) if serve else None
+    viewer = Viewer(source, server, mesh_error=mesh_error, overlays=overlays)
     try:
-        viewer.finish(shown)
+        viewer.finish(result)
     except BaseException:
         viewer.close()
         raise
@@ -373,26 +340,14 @@ def view(shown: Any, *, serve: bool = True, **options: Any) -> Viewer:
 
 def check_to_html(result: CheckResult) -> str:
     """The result as one page in 3D that needs no other file and no network."""
-    with view(result, serve=False) as viewer:
-        return viewer.html()
+    return view(result, serve=False).html()
 
 
-def _scene(shown: Any, clearance: float | None) -> Scene:
-    scene: Scene = shown.scene if isinstance(shown, CheckResult) else shown
-    instance("shown", scene, Scene)
-    return scene if clearance is None else replace(scene, clearance=clearance)
-
-
-def _cut(scene: Scene) -> float | None:
-    """The height on Y of the plane that a scene is cut at: through the middle of its parts' origins."""
-    ys = [float(part.T_world[1, 3]) for part in scene.parts]
-    return 0.5 * (min(ys) + max(ys)) if ys else None
-
-
-def _stop_data(stop: Stop, low: Array, high: Array) -> dict[str, Any]:
-    keys = ("arrive", "leave", "step", "label", "mark", "halts")
-    rows = [row.data() for row in stop.rows[:_LISTED]]
-    return {key: getattr(stop, key) for key in keys} | {"low": low.tolist(), "high": high.tolist(), "rows": rows}
+def _stop_data(stop: Stop, drawing: SceneDrawing) -> dict[str, Any]:
+    low, high = drawing.extent(stop.poses)
+    data = {key: getattr(stop, key) for key in ("arrive", "leave", "step", "label", "mark", "halts", "t")}
+    rows = [row.data() for row in stop.rows[:LISTED]]
+    return data | {"low": low.tolist(), "high": high.tolist(), "rows": rows}
 
 
 def _meshcat_script() -> dict[str, str]:

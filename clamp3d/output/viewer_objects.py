@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import meshcat.geometry as g
@@ -43,67 +43,50 @@ class _Packed(g.Geometry):  # type: ignore[misc]
         return data
 
 
-class Drawn:
-    """What all parts of one shape share: smooth round faces and sharp edges of its mesh, in mm of their frames."""
-
-    def __init__(self, mesh: trimesh.Trimesh) -> None:
-        self._mesh = mesh
-
-    @cached_property
-    def _faces(self) -> g.Geometry:
-        smooth = trimesh.graph.smooth_shade(self._mesh, angle=_CREASE)
-        return _Packed(g.TriangularMeshGeometry(smooth.vertices, smooth.faces))
-
-    @cached_property
-    def _edges(self) -> g.Geometry:
-        sharp = self._mesh.face_adjacency_angles > _CREASE
-        return _Packed(_points(self._mesh.vertices[self._mesh.face_adjacency_edges[sharp]].reshape(-1, 3)))
-
-    def solid(self, colour: str) -> g.Object:
-        """The mesh in a colour."""
-        return g.Mesh(self._faces, _phong(colour))
-
-    def edges(self, colour: str) -> g.Object:
-        """Its sharp edges as lines."""
-        return g.LineSegments(self._edges, _lines(colour))
+def smooth_faces(mesh: trimesh.Trimesh) -> g.Geometry:
+    """The faces of a mesh, round ones smooth; for all parts of one shape."""
+    smooth = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
+    return _Packed(g.TriangularMeshGeometry(smooth.vertices, smooth.faces))
 
 
-def facets(
-    mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0, lit: bool = True, on_top: bool = False
-) -> g.Object:
-    """Flat facets seen from both sides. Without light the colour is as is."""
+def sharp_edges(mesh: trimesh.Trimesh) -> g.Geometry:
+    """The sharp edges of a mesh as pairs of points; for all parts of one shape."""
+    sharp = mesh.face_adjacency_angles > _CREASE
+    return _Packed(points(mesh.vertices[mesh.face_adjacency_edges[sharp]].reshape(-1, 3)))
 
+
+def points(at: ArrayLike) -> g.Geometry:
+    """Points (n, 3)."""
+    return g.PointsGeometry(np.asarray(at, dtype=np.float32).T)
+
+
+def solid(faces: g.Geometry, colour: str) -> g.Object:
+    """Shaded faces in a colour."""
+    return g.Mesh(faces, _phong(colour))
+
+
+def lines(ends: g.Geometry, colour: str, *, on_top: bool = False) -> g.Object:
+    """Straight lines between points two by two."""
+    # three.js draws what is transparent after the solids
+    return g.LineSegments(ends, g.LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top))
+
+
+def facets(mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0, on_top: bool = False) -> g.Object:
+    """Flat facets seen from both sides."""
     geometry = g.TriangularMeshGeometry(mesh.vertices, mesh.faces)
-    if not lit:
-        return g.Mesh(geometry, g.MeshBasicMaterial(color=_number(colour)))
     seen = {"depthTest": False, "transparent": True} if on_top else {}
     return g.Mesh(geometry, _phong(colour, flatShading=True, opacity=opacity, depthWrite=opacity == 1.0, **seen))
-
-
-def segments(points: ArrayLike, colour: str, *, on_top: bool = False) -> g.Object:
-    """Straight lines between the points (2 n, 3) two by two."""
-    return g.LineSegments(_points(points), _lines(colour, on_top=on_top))
-
-
-def _points(points: ArrayLike) -> g.Geometry:
-    return g.PointsGeometry(np.asarray(points, dtype=np.float32).T)
-
-
-def _lines(colour: str, *, on_top: bool = False) -> g.Material:
-    # three.js draws what is transparent after the solids
-    return g.LineBasicMaterial(color=_number(colour), depthTest=not on_top, transparent=on_top)
 
 
 def box(low: Array, high: Array, colour: str) -> g.Object:
     """The twelve edges of a box from corner to corner, drawn over the solids."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     pairs = [(i, j) for i in range(8) for j in range(i) if np.abs(corners[i] - corners[j]).sum() == 1]
-    return segments(low + corners[np.array(pairs).ravel()] * (high - low), colour, on_top=True)
+    return lines(points(low + corners[np.array(pairs).ravel()] * (high - low)), colour, on_top=True)
 
 
 def dot(radius: float, colour: str) -> g.Object:
     """A ball of ``radius`` mm about the origin, drawn over the solids."""
-
     return g.Mesh(g.Sphere(radius), _phong(colour, depthTest=False, transparent=True))
 
 
@@ -120,7 +103,6 @@ def arrow(
 
     Its shaft is ``thickness`` mm thick, by default in proportion.
     """
-
     radius = 0.035 * length if thickness is None else 0.5 * thickness
     head = min(8.5 * radius, 0.8 * length)
     shaft = trimesh.creation.cylinder(radius, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, length - head]], sections=16)
@@ -135,7 +117,6 @@ def arrow(
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Several meshes as one."""
-
     return trimesh.util.concatenate(list(meshes))  # type: ignore[return-value]
 
 
@@ -187,7 +168,6 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
 
 
 def _phong(colour: str, **properties: Any) -> g.Material:
-
     # Seen from both sides (meshcat's default): the inside of cut tubes and of overlays.
     return g.MeshPhongMaterial(color=_number(colour), specular=0x222222, shininess=25, **properties)
 

@@ -1,5 +1,6 @@
 """The viewer without a browser: what is sent, where it is served, and that nothing is left behind."""
 
+import contextlib
 import itertools
 import json
 import re
@@ -16,7 +17,9 @@ import numpy as np
 import pytest
 import trimesh
 import umsgpack
+from scipy.spatial.transform import Rotation
 
+import clamp3d.output.viewer
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.loader import load_clamp
@@ -29,8 +32,10 @@ from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import translation
 from clamp3d.output import placed, serving
+from clamp3d.output.palette import VERDICT_COLOURS, part_colours
 from clamp3d.output.serving import MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer, view
+from clamp3d.output.viewer_story import ClampStory
 
 BAD = ("clash", "contained")
 
@@ -40,7 +45,7 @@ class Recorder(Viewer):
 
     def __init__(self, *arguments, **options):
         self.commands = []
-        super().__init__(*arguments, serve=False, **options)
+        super().__init__(*arguments, **options)
 
     def _send(self, command):
         self.commands.append(command)
@@ -49,12 +54,11 @@ class Recorder(Viewer):
 
 @pytest.fixture(scope="module")
 def recorded():
-    """The viewer of the reference clamp, its assembly, and how many commands came before it."""
-    viewer = Recorder(load_clamp(), mesh_error=0.1)
-    before = len(viewer.commands)
+    """The viewer of the reference clamp, and its assembly."""
+    viewer = Recorder(ClampStory(load_clamp()), mesh_error=0.1)
     assembly = assemble("reference", on_waypoint=viewer.show)
     viewer.finish(assembly)
-    return viewer, assembly, before
+    return viewer, assembly
 
 
 def plate_and_pin(travel=30.0):
@@ -75,8 +79,14 @@ def read(url, host=None):
         return answer.read().decode()
 
 
-def serve(port=None):
-    return PageServer(lambda: "<div id='meshcat-pane'></div>", port=port)
+@contextlib.contextmanager
+def serve(port=None, answer=dict):
+    server = PageServer(port=port)
+    server.start(lambda: "<div id='meshcat-pane'></div>", list, answer)
+    try:
+        yield server
+    finally:
+        server.close()
 
 
 def answers(port):
@@ -95,11 +105,11 @@ def keys_of(clip, name):
 
 
 def test_animation_reaches_every_waypoint_in_turn(recorded):
-    viewer, assembly, _ = recorded
+    viewer, assembly = recorded
     clips = animation_of(viewer)
     assert len({clip["tracks"][0]["keys"][-1]["time"] for clip in clips.values()}) == 1  # three.js ends each by itself
     for part in assembly.poses:
-        clip = next(c for path, c in clips.items() if path.startswith(f"/clamp3d/cutaway/{part} "))
+        clip = clips[f"/clamp3d/parts/{part}"]
         position, quaternion = keys_of(clip, ".position"), keys_of(clip, ".quaternion")
         for stop, waypoint in zip(viewer.story["stops"], assembly.path, strict=True):
             T = waypoint.T_world(part)
@@ -111,8 +121,8 @@ def test_animation_reaches_every_waypoint_in_turn(recorded):
 
 
 def test_nut_turns_as_often_as_the_assembly_says_and_clockwise_from_above(recorded):
-    viewer, assembly, _ = recorded
-    clip = next(c for path, c in animation_of(viewer).items() if path.startswith("/clamp3d/whole/P5"))
+    viewer, assembly = recorded
+    clip = animation_of(viewer)["/clamp3d/parts/P5"]
     turned = 0.0
     for a, b in itertools.pairwise(map(rotation_of, keys_of(clip, ".quaternion").values())):
         step = a.T @ b
@@ -121,14 +131,12 @@ def test_nut_turns_as_often_as_the_assembly_says_and_clockwise_from_above(record
 
 
 def rotation_of(quaternion):
-    from scipy.spatial.transform import Rotation
-
     assert np.linalg.norm(quaternion) == pytest.approx(1.0)
     return Rotation.from_quat(quaternion).as_matrix()
 
 
 def test_every_value_at_every_waypoint_is_what_measure_says(recorded):
-    viewer, assembly, _ = recorded
+    viewer, assembly = recorded
     for stop, waypoint in zip(viewer.story["stops"], assembly.path, strict=True):
         measured = measure(assembly.scene_at(waypoint))
         assert {(row["a"], row["b"]) for row in stop["rows"]} == set(measured)
@@ -136,6 +144,33 @@ def test_every_value_at_every_waypoint_is_what_measure_says(recorded):
             d = measured[row["a"], row["b"]]
             assert row["distance_mm"] == pytest.approx(d.upper, abs=1e-9)
             assert row["at_least_mm"] == pytest.approx(d.lower, abs=1e-9)
+
+
+def test_at_every_moment_the_page_gets_the_distances_of_what_it_draws(recorded):
+    """Poses between the keys as three.js has them: straight lines, and turns about one axis."""
+    from scipy.spatial.transform import Slerp
+
+    viewer, assembly = recorded
+    clips = animation_of(viewer)
+    for seconds in (0.4, 2.0, viewer.story["stops"][5]["arrive"] - 0.2):
+        poses = {}
+        for part in assembly.poses:
+            position, quaternion = (
+                keys_of(clips[f"/clamp3d/parts/{part}"], name) for name in (".position", ".quaternion")
+            )
+            poses[part] = np.eye(4)
+            poses[part][:3, 3] = [
+                np.interp(seconds, list(position), axis) for axis in np.transpose(list(position.values()))
+            ]
+            times = list(quaternion)
+            k = max(1, int(np.searchsorted(times, seconds)))
+            turn = Slerp(times[k - 1 : k + 1], Rotation.from_quat([quaternion[t] for t in times[k - 1 : k + 1]]))
+            poses[part][:3, :3] = turn(seconds).as_matrix()
+        measured = measure(assembly.scene.moved(poses))
+        rows = viewer.answer({"time": str(seconds)})["rows"]
+        assert len(rows) == 21
+        for row in rows:
+            assert row["distance_mm"] == pytest.approx(measured[row["a"], row["b"]].upper, abs=1e-6)
 
 
 def dots_of(viewer):
@@ -151,7 +186,7 @@ def test_every_dot_lies_on_both_bodies(recorded):
 
     from clamp3d.output.placed import place, posed
 
-    viewer, assembly, _ = recorded
+    viewer, assembly = recorded
     placed = place(assembly.scene)
     meshes = {part.name: found.mesh for part, found in zip(placed, posed(placed, 0.002), strict=True)}
     dots = list(dots_of(viewer))
@@ -169,8 +204,8 @@ def line_of(command):
 
 
 def test_an_arrow_for_each_contact_force_as_long_as_its_part_of_the_bolts(recorded):
-    viewer, assembly, _ = recorded
-    whole = float(re.search(r"([\d.]+) mm for the whole", viewer._panel)[1])
+    viewer, assembly = recorded
+    whole = float(re.search(r"([\d.]+) mm for the whole", viewer.html())[1])
     arrows = {}
     for c in viewer.commands:
         if c["path"].startswith(f"/clamp3d/forces/{len(assembly.path)} nut tightened/") and c["path"].endswith(
@@ -210,6 +245,29 @@ def test_scene_with_a_motion_stops_at_first_contact_and_marks_it():
     assert (high > [3.0, 0.0, 0.0]).all()
     assert at_rest["low"][2] == pytest.approx(-4.0)
     assert end["high"][2] == pytest.approx(0.0, abs=1e-9)
+    for time, gap in (
+        (at_rest["leave"], 10.0),
+        (at_rest["leave"] + 0.25 * (contact["arrive"] - at_rest["leave"]), 7.5),
+    ):
+        (row,) = viewer.answer({"time": str(time), "a": "pin", "b": "plate"})["rows"]
+        assert row["at_most_mm"] == pytest.approx(gap, abs=5e-3)  # contact is a gap of 0.01 mm
+
+
+def test_the_saved_curve_of_a_finding_holds_its_distance():
+    """At every moment the bounds hold the distance calculated by hand, on the time line in the right place."""
+    cube = shapes.box((10, 10, 10))
+    scene = Scene().add("still", cube).add("slider", cube, translation(30, 0, 0))
+    with view(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider")), serve=False) as viewer:
+        viewer.html()
+        (finding,), (rest, first, end) = viewer.story["findings"], viewer.story["stops"]
+        (bounds,) = viewer.story["curves"].values()
+    seconds = np.array(finding["moments"])
+    meeting = 0.8 - 0.01 / 25.0  # contact is a gap of 0.01 mm
+    assert seconds[[0, -1]] == pytest.approx([rest["leave"], end["arrive"]])
+    assert 20 <= len(seconds) <= 30
+    t = np.interp(seconds, [rest["leave"], first["arrive"], first["leave"], end["arrive"]], [0, meeting, meeting, 1])
+    assert first["t"] == pytest.approx(meeting, abs=1e-5)
+    np.testing.assert_allclose(bounds, np.column_stack([20.0 - 25.0 * t] * 2), atol=1e-4)
 
 
 def test_a_clean_clamp_has_notes_and_no_findings():
@@ -260,7 +318,7 @@ def test_equal_parts_are_meshed_and_written_once(monkeypatch):
     smooth = trimesh.graph.smooth_shade
     monkeypatch.setattr(trimesh.graph, "smooth_shade", lambda *a, **k: drawn.append(1) or smooth(*a, **k))
     scene = Scene()
-    for k in range(70):  # more than are cut open
+    for k in range(70):
         shape = shapes.cylinder(3, 10) if k % 3 == 0 else shapes.box((5, 5, 5))  # equal, not the same
         scene = scene.add(f"p{k}", shape, translation(20.0 * k, 0, 0))
     with view(scene, serve=False) as viewer:
@@ -285,6 +343,8 @@ def test_equal_parts_are_meshed_and_written_once(monkeypatch):
 
 def test_page_under_a_foreign_name_is_refused():
     with serve() as server:
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            read(server.url + "answer", "evil.example")
         for host in ("evil.example", "evil.example:7000", "localhost.evil.example"):
             with pytest.raises(urllib.error.HTTPError, match="403"):
                 read(server.url, host)
@@ -304,9 +364,60 @@ def test_second_viewer_takes_the_next_port_and_closing_frees_it():
     first.close()  # again does nothing
 
 
+def test_verdicts_are_listed_while_the_check_runs_the_worst_first(monkeypatch):
+    monkeypatch.setattr(clamp3d.output.viewer, "_PAUSE", 0.0)
+    scene = Scene().add("base", shapes.box((100, 10, 10)))
+    for name, x, z in (("touching", 0, 10.0), ("shallow", -30, 9.0), ("deep", 30, 6.0)):
+        scene = scene.add(name, shapes.box((10, 10, 10)), translation(x, 0, z))
+    viewer, lists = Viewer(scene), []
+    result = check(scene, on_row=lambda row: (viewer.show_row(row), lists.append(viewer.story["findings"])))
+    names = [[finding["b"] for finding in findings] for findings in lists]
+    assert names[-3:] == [["deep", "shallow", "touching"]] * 3
+    assert ["at least" in findings[0]["title"] for findings in lists[-3:]] == [True, False, False]
+    assert "So far: 2 clashes" in viewer.story["headline"]
+    viewer.finish(result)
+    assert viewer.story["headline"].startswith("2 clashes")
+
+
+# Dichromats as Machado, Oliveira and Fernandes (2009) simulate them, severity 1, on linear RGB.
+DICHROMATS = {
+    "protanope": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranope": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "tritanope": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+
+
+def lab(colour, matrix):
+    """CIE L*a*b* of "#RRGGBB" as somebody sees it."""
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+    linear = np.clip(matrix @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    xyz = np.array(to_xyz) @ linear / [0.95047, 1.0, 1.08883]
+    f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("eyes", DICHROMATS)
+def test_colours_of_verdicts_differ_for_colour_blind_readers(eyes):
+    """Clash, contact, gap and clear by at least 25 in L*a*b* (one is just seen), and no part looks like a clash."""
+    seen = {name: lab(VERDICT_COLOURS[name], DICHROMATS[eyes]) for name in ("clash", "contact", "clearance", "clear")}
+    for a, b in itertools.combinations(seen, 2):
+        assert np.linalg.norm(seen[a] - seen[b]) > 25, (a, b)
+    for colour in part_colours([f"part {k}" for k in range(8)]).values():
+        assert np.linalg.norm(lab(colour, DICHROMATS[eyes]) - seen["clash"]) > 15, colour
+
+
 def test_port_that_is_taken_is_an_error_that_says_so():
     with serve() as first, pytest.raises(InputError, match=f"port {first.port}.*leave --port out"):
-        serve(port=first.port)
+        PageServer(port=first.port)
+
+
+def test_a_bad_question_is_answered_with_what_is_wrong():
+    with view(plate_and_pin()) as viewer:
+        for query, message in (("time=soon", "soon"), ("time=1&a=pin&b=bolt", "bolt"), ("", "None")):
+            with pytest.raises(urllib.error.HTTPError, match="400") as refused:
+                read(f"{viewer.url}answer?{query}")
+            assert message in json.loads(refused.value.read())["error"]
 
 
 def test_other_files_are_not_served():

@@ -1,20 +1,24 @@
-"""The viewer in a real browser: the live page, the page as a file, and a meshcat server that was there before.
+"""The viewer in a real browser: the served page, the page as a file, and a meshcat server that was there before.
 
 The scene is looked at in two ways: the poses in the browser's scene tree against the run's, and the pixels at points of
 the cut faces, found with the browser's own camera, against the part's colour.
 """
 
 import io
+import itertools
 import math
 import os
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import clamp3d.output.viewer
 from clamp3d.clamp.assemble import assemble
 from clamp3d.engine.check import check
 from clamp3d.engine.scene import Scene
@@ -27,7 +31,10 @@ from clamp3d.geometry.pose import translation
 from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS
+from clamp3d.output.serving import PageServer
 from clamp3d.output.viewer import Viewer, check_to_html, view
+from clamp3d.output.viewer_story import ClampStory
+from clamp3d.scenefile.load import load
 
 playwright_api = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need playwright: pip install 'clamp3d[dev]'"
@@ -75,42 +82,49 @@ def run():
     return assemble("reference")
 
 
-@pytest.fixture(scope="module")
-def page(browser, run, tmp_path_factory):
-    """The page as a file, opened without a network."""
-    path = tmp_path_factory.mktemp("page") / "run.html"
-    with view(run, serve=False) as viewer:
-        viewer.save_html(path)
-    page = open_page(browser, path.as_uri(), offline=True)
-    wait_for(page, "viewer.animator.duration > 0 && viewer.scene.getObjectByName('clamp3d') !== undefined")
-    yield page
-    assert page.problems == []
+@pytest.fixture
+def saved(browser, tmp_path):
+    """Opens what is shown as a saved page, without a network; no error may come up in it."""
+    pages = []
+
+    def save(shown, fragment="", **options):
+        path = tmp_path / "page.html"
+        view(shown, serve=False).save_html(path)
+        page = open_page(browser, path.as_uri() + fragment, offline=True, **options)
+        wait_for(page, "document.querySelector('.part')")
+        page.wait_for_timeout(200)
+        pages.append(page)
+        return page
+
+    yield save
+    for page in pages:
+        assert page.problems == []
+        page.context.close()
 
 
 @pytest.fixture(scope="module")
-def hinge(tmp_path_factory):
-    """The page of ``check`` for the hinge with its pin out of place: a clash at rest, and one in a motion."""
-    from clamp3d.scenefile.load import load
+def hinge():
+    """The check of the hinge with its pin out of place: a clash at rest, and one in a motion."""
+    return check(load(str(EXAMPLES / "hinge" / "scene.toml")).moved({"pin": translation(0.4, 0.0, 0.0)}))
 
-    scene = load(str(EXAMPLES / "hinge" / "scene.toml")).moved({"pin": translation(0.4, 0.0, 0.0)})
-    result = check(scene)
-    path = tmp_path_factory.mktemp("hinge") / "check.html"
-    path.write_text(check_to_html(result), encoding="utf-8")
-    return path, result
+
+@pytest.fixture
+def two_boxes(saved):
+    scene = Scene().add("left", shapes.box((10, 10, 10))).add("right", shapes.box((10, 10, 10)), translation(30, 0, 0))
+    return saved(check(scene, distances=True))
 
 
 @pytest.fixture(scope="module")
-def hinge_page(browser, hinge):
-    page = open_page(browser, hinge[0].as_uri(), offline=True)
-    wait_for(page, "viewer.animator.duration > 0")
-    yield page
-    assert page.problems == []
+def sliding():
+    """A box that slides 25 mm along X, from a gap of 20 mm to an overlap of 5 mm."""
+    cube = shapes.box((10, 10, 10))
+    scene = Scene().add("still", cube).add("slider", cube, translation(30, 0, 0))
+    return check(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider", name="push")))
 
 
 def open_page(browser, url, *, offline=False, **options):
     options = {"viewport": {"width": 1200, "height": 700}, "reduced_motion": "reduce"} | options
-    context = browser.new_context(offline=offline, **options)
-    page = context.new_page()
+    page = browser.new_context(offline=offline, **options).new_page()
     page.problems = []
     page.on("pageerror", lambda error: page.problems.append(str(error)))
     page.on("console", lambda message: page.problems.append(message.text) if message.type == "error" else None)
@@ -169,11 +183,9 @@ def cut_colours(page, poses):
     return {name: image[round(y), round(x)] for name, (x, y) in zip(CUT, on_screen(page, points), strict=True)}
 
 
-def assert_drawn(page, poses, seek=""):
+def assert_drawn(page, poses):
     wanted = {name: [int(PART_COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)] for name in CUT}
     for _ in range(30):  # a busy machine draws the frame later, or hands parts to the page after the first look
-        if seek:
-            page.evaluate(seek)
         seen = cut_colours(page, poses)
         if all(np.allclose(seen[name], wanted[name], rtol=0.0, atol=3) for name in CUT):
             break
@@ -183,24 +195,34 @@ def assert_drawn(page, poses, seek=""):
 
 
 def go_to(page, number):
-    wait_for(page, f"document.getElementById('marks').children.length > {number}")  # a live page asks for them
+    wait_for(page, f"document.getElementById('marks').children.length > {number}")
     page.evaluate("n => document.getElementById('marks').children[n].click()", number)
     page.wait_for_timeout(100)
 
 
-def test_page_steps_through_the_sequence(page, run):
+def seek(page, seconds):
+    page.evaluate("viewer.animator.pause()")
+    page.locator("#time").fill(f"{seconds:.3f}")
+    page.evaluate("document.activeElement.blur()")
+
+
+def opacity(page, part):
+    return page.evaluate(
+        "path => viewer.scene_tree.find(path).object.material.opacity", ["clamp3d", "parts", part, "solid", "<object>"]
+    )
+
+
+def camera(page):
+    return np.array(page.evaluate("viewer.camera.position.toArray()"))
+
+
+def test_page_steps_through_the_sequence(saved, run):
+    page = saved(run)
     go_to(page, 0)
     for number, waypoint in enumerate(run.path):
         assert waypoint.label in page.inner_text("#label")
-        assert waypoint.step in page.inner_text("#step") or waypoint.label.startswith(waypoint.step)
         for name, pose in waypoint.poses.items():
-            tree = "cutaway" if number % 2 else "whole"
-            title = page.evaluate(
-                """([tree, name]) => Object.keys(viewer.scene_tree.find(["clamp3d", tree]).children)
-                    .find((key) => key.startsWith(name + " "))""",
-                [tree, name],
-            )
-            T = pose_in_browser(page, [tree, title])
+            T = pose_in_browser(page, ["parts", name])
             np.testing.assert_allclose(T[:3, 3], pose.T()[:3, 3], atol=2e-4)
             if name != "P5":  # the nut also turns
                 np.testing.assert_allclose(T[:3, :3], pose.T()[:3, :3], atol=1e-5)
@@ -210,105 +232,103 @@ def test_page_steps_through_the_sequence(page, run):
             assert visible(page, "gaps", group) == (other == number)
         page.click("#forward")
         page.wait_for_timeout(50)
+    assert_drawn(page, run.poses)  # cut open as it is opened
+    before = camera(page)
+    page.click(".stop:not([hidden]) tr[data-a=P1][data-b=P2] button")
+    page.wait_for_timeout(100)
+    assert np.linalg.norm(camera(page) - before) > 0.5
+    assert opacity(page, "P6") < 0.2
+    assert opacity(page, "P1") == 1.0
+    page.click("#home")
     page.click("#back")
     assert run.path[-2].label in page.inner_text("#label")
+    assert opacity(page, "P6") == 1.0
 
 
-def test_row_of_a_pair_flies_to_it_and_fades_the_others(page, run):
-    go_to(page, len(run.path) - 1)
-    before = page.evaluate("viewer.camera.position.toArray()")
-    page.click(".stop:not([hidden]) tr[data-a=P1][data-b=P2]")
-    page.wait_for_timeout(100)
-    assert np.linalg.norm(np.subtract(page.evaluate("viewer.camera.position.toArray()"), before)) > 0.5
-    assert opacity(page, "P6 power line") < 0.2
-    assert opacity(page, "P1 up splint") == 1.0
-    page.click("#home")
-    page.wait_for_timeout(100)
-    assert opacity(page, "P6 power line") == 1.0
-    assert_drawn(page, run.poses)
-
-
-def opacity(page, part, tree="cutaway"):
-    return page.evaluate(
-        "path => viewer.scene_tree.find(path).object.material.opacity", ["clamp3d", tree, part, "solid", "<object>"]
-    )
-
-
-def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
-    page, (_, result) = hinge_page, hinge
-    assert page.title().startswith(result.scene.name)
+def test_findings_of_a_check_lead_to_their_places(saved, hinge):
+    page = saved(hinge)
+    assert page.title().startswith(hinge.scene.name)
     assert re.match(r"\d+ clash", page.inner_text("#headline"))
-    rows = [row for group in grouped(result) for row in group.rows]
-    findings = page.query_selector_all(".finding")
-    assert len(findings) == len(rows)
-    for k, row in enumerate(rows):
-        findings[k].click()
+    rows = [row for group in grouped(hinge) for row in group.rows]
+    assert len(page.query_selector_all(".finding")) == len(rows)
+    assert page.get_attribute(".finding", "aria-current") == "true"  # the worst is shown at once
+    page.keyboard.press("Escape")
+    for row in rows:
+        page.keyboard.press("n")
         page.wait_for_timeout(100)
         label = page.inner_text("#label")
         assert ("first contact" in label) == (row.contact_at is not None and row.contact_at > 0.0)
         assert (row.motion or "at rest") in label
         (a, b), others = (row.a, row.b), {"leaf-a", "leaf-b", "pin"} - {row.a, row.b}
-        assert opacity(page, a, "whole") == opacity(page, b, "whole") == 1.0
-        assert all(opacity(page, name, "whole") < 0.2 for name in others)
-        point = row.distance.point_a
-        if row.motion is None and point is not None:
-            ((x, y),) = on_screen(page, [point])
-            assert 400 < x < 1200
-            assert 0 < y < 620
-    at_rest = next(k for k, row in enumerate(rows) if row.motion is None)
-    findings[at_rest].click()
-    page.wait_for_timeout(100)
-    image = pixels(page)
-    red = (image[..., 0] > 150) & (image[..., 1] < 110) & (image[..., 2] < 110)
-    assert red[:, 370:].sum() > 200
+        seen_into = row.verdict.value in ("clash", "contained", "duplicate")
+        assert all((opacity(page, name) < 0.6) == seen_into and opacity(page, name) > 0.4 for name in (a, b))
+        assert all(opacity(page, name) < 0.2 for name in others)
+        if row.motion is None:
+            ((x, y),) = on_screen(page, [row.distance.point_a])
+            assert (400 < x < 1200, 0 < y < 620) == (True, True)
+            image = pixels(page)
+            red = (image[..., 0] > 150) & (image[..., 1] < 110) & (image[..., 2] < 110)
+            assert red[:, 370:].sum() > 100
 
 
-def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
-    page = hinge_page
-    stops = page.evaluate("viewer.scene_tree.find(['clamp3d']).object.story.stops")
-    contact = next(k for k, stop in enumerate(stops) if stop["halts"])
-    page.evaluate(f"viewer.animator.seek({stops[contact]['arrive'] - 0.4})")
-    page.evaluate("viewer.animator.play()")
-    wait_for(page, "!viewer.animator.playing")
-    assert page.evaluate("viewer.animator.time") == pytest.approx(stops[contact]["arrive"], abs=0.02)
-    assert "first contact at t = " in page.inner_text("#label")
+def test_play_halts_at_first_contact_and_goes_on_when_asked(saved, hinge):
+    page = saved(hinge)
+    contact = next(stop["arrive"] for stop in view(hinge, serve=False).story["stops"] if stop["halts"])
+    seek(page, contact - 0.4)
     page.click("#play")
-    wait_for(page, f"viewer.animator.time > {stops[contact]['arrive'] + 0.3}")
-    page.evaluate("viewer.animator.pause()")
+    wait_for(page, f"!viewer.animator.playing && viewer.animator.time > {contact}")
+    assert page.evaluate("viewer.animator.time") == pytest.approx(contact, abs=0.02)
+    assert "first contact at t = " in page.inner_text("#label")
+    page.keyboard.press(" ")
+    wait_for(page, f"viewer.animator.time > {contact + 0.3}")
+    page.keyboard.press(" ")
+    assert not page.evaluate("viewer.animator.playing")
 
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
 
 
-def test_page_on_a_phone(browser, hinge):
-    page = open_page(browser, hinge[0].as_uri(), offline=True, **PHONE)
-    wait_for(page, "viewer.animator.duration > 0")
+def test_page_on_a_phone(saved, hinge):
+    page = saved(hinge, **PHONE)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     pane = page.query_selector("#meshcat-pane").bounding_box()
     assert pane["width"] == 390
     assert pane["height"] > 250
     assert page.is_visible("#headline")
-    for element in page.query_selector_all(".finding, #play, #back, #forward"):
+    for element in page.query_selector_all(".finding, #search, #play, #back, #forward"):
         box = element.bounding_box()
         assert min(box["width"], box["height"]) >= 36  # big enough for a finger
     page.tap(".finding")
     page.wait_for_timeout(200)
     assert page.query_selector(".finding.now")
-    assert page.problems == []
-    page.context.close()
+    marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
+    marks = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
+    assert all(right <= left for (_, right), (left, _) in itertools.pairwise(marks))
 
 
-def test_page_in_dark_mode_is_dark_and_readable(hinge_page):
-    page = hinge_page
+def test_page_in_dark_mode_is_dark_and_readable(saved, hinge):
+    page = saved(hinge, color_scheme="dark")
     page.keyboard.press("h")
-    page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(300)
     image = pixels(page)
     assert image[5, -5].max() < 70  # behind the parts
     assert image[-5, 5].max() < 70  # the panel
-    for selector in ("h1", "#headline", ".finding b", ".small", "td", "h2"):
+    for selector in ("h1", "#headline", ".finding b", ".small", "td", "h2", "#search", "button.pair"):
         assert contrast(page, selector) > 4.5, selector  # WCAG 2.2, level AA
-    page.emulate_media(color_scheme="light")
+
+
+def test_a_screen_reader_can_name_everything(saved, hinge):
+    page = saved(hinge)
+    tree = page.locator("body").aria_snapshot()
+    controls = re.findall(r"- (button|checkbox|slider|searchbox|combobox|img)( \"[^\"]+\")?", tree)
+    assert {role for role, _ in controls} == {"button", "checkbox", "slider", "searchbox", "combobox", "img"}
+    assert [role for role, name in controls if not name] == []
+    assert "3D view of hinge" in tree
+    page.keyboard.press("/")
+    for _ in range(2):
+        page.keyboard.press("Tab")
+    page.keyboard.press("Enter")  # the second finding, by keys alone
+    assert page.evaluate("document.activeElement.classList.contains('now')")
 
 
 @pytest.mark.parametrize(("scheme", "dark"), [("dark", True), ("light", False)])
@@ -348,11 +368,9 @@ def contrast(page, selector):
 
 
 @pytest.mark.parametrize("javascript", [True, False])
-def test_findings_can_be_read_without_webgl_or_script(hinge, javascript):
-    path, result = hinge
-    import subprocess
-    import sys
-
+def test_findings_can_be_read_without_webgl_or_script(hinge, javascript, tmp_path):
+    path = tmp_path / "check.html"
+    path.write_text(check_to_html(hinge), encoding="utf-8")
     # A browser of its own: its WebGL is switched off for good, and playwright's loop runs in this process already.
     code = f"""
 from playwright.sync_api import sync_playwright
@@ -371,26 +389,56 @@ with sync_playwright() as playwright:
     assert "stage: False" in done.stdout
     assert ("cannot draw 3D" in done.stdout) == javascript
     assert ("Scripts are off" in done.stdout) != javascript
-    for group in grouped(result):
+    for group in grouped(hinge):
         assert f"{group.a} and {group.b}" in done.stdout
 
 
-def test_served_page_follows_the_run_until_it_is_done(browser, run):
-    with Viewer(run.clamp, mesh_error=0.1) as viewer:
+def test_served_page_follows_the_run_and_measures_between_the_stops(browser, run):
+    with Viewer(ClampStory(run.clamp), PageServer(), mesh_error=0.1) as viewer:
         viewer.show(run.path[0])
         page = open_page(browser, viewer.url)
         wait_for(page, f'document.getElementById("headline").textContent.includes("{run.path[0].label}")')
         assert not page.is_visible("#timeline")
         page.emulate_media(reduced_motion="no-preference")
         viewer.finish(run)
-        wait_for(page, 'document.getElementById("headline").textContent === "clamped"')  # it loads itself again
+        wait_for(page, 'document.getElementById("headline").textContent === "clamped"')
         wait_for(page, "viewer.animator.playing")
+        first, second = viewer.story["stops"][:2]
+        seconds = (first["leave"] + second["arrive"]) / 2
+        seek(page, seconds)
+        seconds = page.evaluate("viewer.animator.time")  # to a thousandth
+        wait_for(page, "document.querySelectorAll('#now tr').length === 21")
+        page.wait_for_timeout(500)  # what was measured while it played comes first
+        cells = "[...document.querySelectorAll('#now tr')].map((tr) => [1, 2].map((k) => tr.cells[k].textContent))"
+        shown = dict(page.evaluate(cells))
+        for row in viewer.answer({"time": str(seconds)})["rows"]:
+            assert shown[f"{row['a']}\u2013{row['b']}"] == row["gap"]
         go_to(page, len(run.path) - 1)
         assert_drawn(page, run.poses)
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(500)
     assert page.is_visible("#timeline")  # the page stays when nothing is served any more
     assert page.problems == []
     page.context.close()
+
+
+def test_a_served_page_lists_verdicts_as_they_come_and_keeps_what_is_picked(browser, sliding, monkeypatch):
+    monkeypatch.setattr(clamp3d.output.viewer, "_PAUSE", 0.0)
+    scene = sliding.scene.add("deep", shapes.box((4, 4, 4)), translation(0, 0, 6))
+    with Viewer(scene, PageServer()) as viewer:
+        page = open_page(browser, viewer.url)
+        wait_for(page, "document.getElementById('headline').textContent === 'checking ...'")
+        viewer.show_row(check(replace(scene, motions=()), depths=False).pairs[0])
+        wait_for(page, "document.querySelectorAll('.finding').length === 1")
+        assert "the check is running" in page.inner_text("#headline")
+        assert "still and deep clash: overlap at least 0.9999 mm" in page.inner_text(".finding")
+        page.click(".finding")
+        viewer.finish(check(scene))
+        wait_for(page, "document.querySelectorAll('#findings > li').length === 3")
+        assert "still and deep clash: overlap 1.000000 mm" in page.inner_text(".finding.now")
+        page.click(".finding >> nth=-1")  # in a motion: its curve is measured now
+        wait_for(page, "(document.querySelector('#curve polygon')?.points.length || 0) >= 40")
+        assert page.problems == []
+        page.context.close()
 
 
 def test_report_shows_its_pictures_and_links(browser, odd_page, tmp_path):
@@ -411,18 +459,14 @@ def test_meshcat_server_that_was_there_before(browser, run):
 
     server, zmq_url, web_url = start_zmq_server_as_subprocess()
     try:
-        with Viewer(run.clamp, mesh_error=0.1, url=zmq_url) as viewer:
+        with view(run, mesh_error=0.1, url=zmq_url) as viewer:
             assert viewer.url == web_url
-            for waypoint in run.path:
-                viewer.show(waypoint)
-            viewer.finish(run)
         page = open_page(browser, web_url)  # meshcat's own page, after we have left
         wait_for(page, "viewer.animator.duration > 0")
-        page.evaluate("viewer.animator.pause(); viewer.animator.seek(0)")
-        np.testing.assert_allclose(
-            pose_in_browser(page, ["cutaway", "P1 up splint"]), run.path[0].poses["P1"].T(), atol=2e-4
-        )
-        assert_drawn(page, run.poses, seek="viewer.animator.seek(viewer.animator.duration)")
+        for seconds, waypoint in (("0", run.path[0]), ("viewer.animator.duration", run.path[-1])):
+            page.evaluate(f"viewer.animator.pause(); viewer.animator.seek({seconds})")
+            for name in ("P1", "P2", "P6"):
+                np.testing.assert_allclose(pose_in_browser(page, ["parts", name]), waypoint.poses[name].T(), atol=2e-4)
         assert visible(page, "caption")  # the mesh error, in the picture itself
         page.context.close()
     finally:
@@ -430,20 +474,8 @@ def test_meshcat_server_that_was_there_before(browser, run):
         server.communicate()
 
 
-@pytest.fixture
-def boxes_page(browser, tmp_path):
-    scene = Scene().add("left", shapes.box((10, 10, 10))).add("right", shapes.box((10, 10, 10)), translation(30, 0, 0))
-    view(scene, serve=False).save_html(tmp_path / "two.html")
-    page = open_page(browser, (tmp_path / "two.html").as_uri(), offline=True)
-    wait_for(page, "document.querySelector('.part')")
-    page.locator("#switch-cutaway").uncheck()
-    page.wait_for_timeout(200)
-    yield page
-    assert page.problems == []
-
-
-def test_a_section_hides_what_is_before_it(boxes_page):
-    page = boxes_page
+def test_a_section_hides_what_is_before_it(two_boxes):
+    page = two_boxes
     middles = on_screen(page, [(0.0, -5.0, 0.0), (30.0, -5.0, 0.0)])
 
     def named():
@@ -469,74 +501,87 @@ def test_a_section_hides_what_is_before_it(boxes_page):
     assert named() == ["left", "right"]
 
 
-def test_two_clicks_measure(boxes_page):
-    page = boxes_page
-    page.keyboard.press("m")
-    for point in on_screen(page, [(0.0, -5.0, 0.0), (30.0, -5.0, 2.0)]):
-        page.mouse.click(*point)
-    words = page.inner_text("#measured")
-    found = re.fullmatch(
-        r"left to right: ([\d.]+) mm between the points, within 0.02 mm \(X ([\d.]+), Y 0.00, Z ([\d.]+)\); "
-        r"the parts: gap 20.0000 mm",
-        words,
-    )
-    assert found, words
-    pixel = 0.2
-    np.testing.assert_allclose([float(x) for x in found.groups()], [math.hypot(30.0, 2.0), 30.0, 2.0], atol=pixel)
+def test_two_clicks_measure_also_on_a_cut(two_boxes):
+    page, pixel = two_boxes, 0.2
+
+    def measured(first, second):
+        page.keyboard.press("Escape")
+        page.keyboard.press("m")
+        for point in on_screen(page, [first, second]):
+            page.mouse.click(*point)
+        wait_for(page, "document.getElementById('measured').textContent.includes('the parts')")
+        words = page.inner_text("#measured")
+        found = re.fullmatch(
+            r"left to right: ([\d.]+) mm between the points, within 0.02 mm \(X ([\d.]+), Y (.*), Z ([\d.]+)\); "
+            r"the parts: gap 20.0000 mm",
+            words,
+        )
+        assert found, words
+        return [float(x) for x in found.groups()]
+
+    length = math.hypot(30.0, 2.0)
+    np.testing.assert_allclose(measured((0, -5, 0), (30, -5, 2)), [length, 30.0, 0.0, 2.0], atol=pixel)
+    page.select_option("#section-axis", "Y")  # at Y = 0
+    np.testing.assert_allclose(measured((0, 0, 0), (30, 0, 2)), [length, 30.0, 0.0, 2.0], atol=pixel)
     page.keyboard.press("Escape")
     assert not page.is_visible("#measured")
 
 
-def test_a_part_can_be_named_isolated_ghosted_and_hidden(boxes_page):
-    page = boxes_page
+def test_a_part_can_be_named_isolated_ghosted_and_hidden(two_boxes):
+    page = two_boxes
     ((x, y),) = on_screen(page, [(30.0, -5.0, 0.0)])
     page.mouse.click(x, y)
     assert page.inner_text("#identity b") == "right"
     page.click("#identity [data-do=isolate]")
-    assert (opacity(page, "left", "whole") < 0.2, opacity(page, "right", "whole")) == (True, 1.0)
-    page.click("#identity [data-do=ghost]")
-    assert opacity(page, "right", "whole") < 0.2
+    assert (opacity(page, "left") < 0.2, opacity(page, "right")) == (True, 1.0)
+    page.keyboard.press("g")
+    assert opacity(page, "right") < 0.2
     page.keyboard.press("Escape")
-    assert opacity(page, "left", "whole") == opacity(page, "right", "whole") == 1.0
+    assert opacity(page, "left") == opacity(page, "right") == 1.0
     page.click(".part[data-part=left]")
     page.click("#identity [data-do=hide]")
-    assert not page.evaluate(
-        "viewer.scene_tree.find(['clamp3d', 'whole', 'left', 'solid', '<object>']).object.material.visible"
-    )
+    assert opacity(page, "left") == 0.0
 
 
-def test_the_address_can_name_a_finding(browser, hinge):
-    path, result = hinge
-    group = grouped(result)[-1]
-    page = open_page(browser, f"{path.as_uri()}#finding={group.id}", offline=True)
-    wait_for(page, "document.querySelector('.finding.now')")
-    assert page.evaluate("document.querySelector('.finding.now').dataset.id") == group.id
-    assert page.problems == []
+def test_the_address_names_the_finding_and_the_camera(saved, hinge):
+    group = grouped(hinge)[-1]
+    page = saved(hinge, f"#finding={group.id}")
+    assert page.get_attribute(".finding.now", "data-id") == group.id
+    page.mouse.move(800, 300)
+    page.mouse.down()
+    page.mouse.move(900, 340)
+    page.mouse.up()
+    page.wait_for_timeout(200)
+    seen, fragment = camera(page), page.evaluate("location.hash")
+    again = saved(hinge, fragment)
+    assert again.get_attribute(".finding.now", "data-id") == group.id
+    np.testing.assert_allclose(camera(again), seen, atol=1e-3)
 
 
-def test_the_list_of_findings_holds_those_of_the_part_that_is_picked(browser, tmp_path):
+def test_the_list_holds_the_findings_of_a_part(saved):
     scene = Scene()
     for k, x in enumerate((0.0, 9.0, 50.0, 58.0)):
-        scene = scene.add("abcd"[k], shapes.box((10, 10, 10)), translation(x, 0, 0))
-    page = open_scene(browser, check(scene), tmp_path)
+        scene = scene.add(("ax", "b", "cx", "d")[k], shapes.box((10, 10, 10)), translation(x, 0, 0))
+    page = saved(check(scene))
     rows = "[...document.querySelectorAll('#findings > li')].filter((e) => !e.hidden).map((e) => e.innerText)"
     assert len(page.evaluate(rows)) == 2
-    page.click(".part[data-part=c]")
-    assert page.inner_text("#filtered").strip() == "- 1 with c, of 2"
+    page.click(".part[data-part=cx]")
+    assert page.inner_text("#filtered").strip() == "- 1 with cx, of 2"
     (row,) = page.evaluate(rows)
-    assert re.search("c.*d", row)
+    assert re.search("cx.*d", row)
     page.keyboard.press("Escape")
-    assert len(page.evaluate(rows)) == 2
+    for text, count in (("X", 2), ("a", 1), ("e", 0), ("", 2)):
+        page.fill("#search", text)
+        assert len(page.evaluate(rows)) == count
     assert page.inner_text("#filtered") == ""
-    assert page.problems == []
 
 
-def test_labels_never_cover_each_other(browser, tmp_path):
+def test_labels_never_cover_each_other(saved):
     """Rays through a grid of pixels, by three.js: none meets two labels that are drawn; some labels always are."""
     scene = Scene()
     for k in range(12):
         scene = scene.add(f"washer_number_{k}", shapes.box((3, 3, 0.05)), translation(0.4 * k, 0, 0.1 * k))
-    page = open_scene(browser, check(scene), tmp_path)
+    page = saved(check(scene))
     page.locator("#switch-labels").check()
     for path in ("viewer.camera.zoom = 1", "viewer.camera.zoom = 3"):
         seen = page.evaluate(
@@ -558,43 +603,19 @@ def test_labels_never_cover_each_other(browser, tmp_path):
         )
         assert seen[0] == 1
         assert seen[1] >= 4
-    assert page.problems == []
 
 
-@pytest.fixture(scope="module")
-def sliding():
-    """A box that slides 25 mm along X, from a gap of 20 mm to an overlap of 5 mm."""
-    cube = shapes.box((10, 10, 10))
-    scene = Scene().add("still", cube).add("slider", cube, translation(30, 0, 0))
-    return check(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider", name="push")))
-
-
-def test_the_curve_of_a_finding_holds_its_distance(sliding):
-    """At every moment the bounds hold the distance calculated by hand, on the time line in the right place."""
-    with view(sliding, serve=False) as viewer:
-        (curve,), stops = viewer.story["curves"], viewer.story["stops"]
-    assert {curve["a"], curve["b"]} == {"still", "slider"}
-    t, bounds = np.array(curve["t"]), np.array(curve["bounds"], dtype=float)
-    assert (t[0], t[-1]) == (0.0, 1.0)
-    assert 20 <= len(t) <= 30
-    np.testing.assert_allclose(bounds, np.column_stack([20.0 - 25.0 * t] * 2), atol=1e-6)
-    seconds = {stop["label"]: (stop["arrive"], stop["leave"]) for stop in stops}
-    (rest, first, end) = seconds.values()
-    drawn = np.array(curve["seconds"])
-    np.testing.assert_allclose(drawn[[0, -1]], [rest[1], end[0]])
-    (meeting,) = t[np.isclose(drawn, first[0])]
-    assert 0.8 - 0.01 / 25.0 - 1e-6 <= meeting <= 0.8  # contact is a gap of 0.01 mm
-    late = t > meeting
-    np.testing.assert_allclose(drawn[late], first[1] + (t[late] - meeting) / (1.0 - meeting) * (end[0] - first[1]))
-
-
-def test_a_picked_finding_of_a_motion_shows_its_curve(browser, sliding, tmp_path):
-    page = open_scene(browser, sliding, tmp_path)
+def test_a_picked_finding_of_a_motion_shows_its_curve(saved, sliding):
+    page = saved(sliding)
+    page.keyboard.press("Escape")
     assert not page.is_visible("#curve")
     page.click(".finding")
-    page.evaluate("document.getElementById('marks').children[0].click()")
+    go_to(page, 0)
     wait_for(page, "document.querySelector('#curve figcaption').textContent.includes('t = 0.000')")
     assert re.search(r"(19.9999|20.0000) to 20.000[01] mm$", page.inner_text("#curve figcaption"))
+    seek(page, 3.0)
+    wait_for(page, "document.getElementById('now').textContent.includes('listed at the stops')")
+    assert page.query_selector(".stop:not([hidden])") is None  # on the way nothing is said of another moment
     page.evaluate("document.getElementById('marks').lastChild.click()")
     wait_for(page, "document.querySelector('#curve figcaption').textContent.includes('t = 1.000')")
     assert re.search(r"-5.000[01] to -(5.0000|4.9999) mm$", page.inner_text("#curve figcaption"))
@@ -606,27 +627,3 @@ def test_a_picked_finding_of_a_motion_shows_its_curve(browser, sliding, tmp_path
     assert (max(heights) - heights[-1]) / (max(heights) - min(heights)) == pytest.approx(0.2, abs=1e-3)
     page.keyboard.press("Escape")
     assert not page.is_visible("#curve")
-    assert page.problems == []
-
-
-def test_a_served_page_lists_findings_before_their_depths(browser, sliding):
-    scene = sliding.scene.add("deep", shapes.box((4, 4, 4)), translation(0, 0, 6))
-    with Viewer(scene, serve=True) as viewer:
-        viewer.preview(check(replace(scene, motions=()), depths=False))
-        page = open_page(browser, viewer.url)
-        wait_for(page, "document.querySelectorAll('.finding').length === 1")
-        assert "depths and motions follow" in page.inner_text("#headline")
-        assert "still and deep clash: overlap at least 0.9999 mm" in page.inner_text(".finding")
-        viewer.finish(check(scene))
-        wait_for(page, "document.querySelectorAll('#findings > li').length === 3")
-        assert "still and deep clash: overlap 1.000000 mm" in page.inner_text("#findings")
-        assert "follow" not in page.inner_text("#headline")
-        assert page.problems == []
-
-
-def open_scene(browser, result, folder):
-    (folder / "check.html").write_text(check_to_html(result), encoding="utf-8")
-    page = open_page(browser, (folder / "check.html").as_uri(), offline=True)
-    wait_for(page, "document.querySelector('.part')")
-    page.wait_for_timeout(200)
-    return page

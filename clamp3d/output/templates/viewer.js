@@ -1,16 +1,16 @@
 "use strict";
-// Time line, camera and switches around meshcat's viewer. What they show comes as `story` of the node /clamp3d; what
-// the panel says is HTML in it.
+// The page around meshcat's viewer: findings, parts, camera and switches. What they show comes as `story`, a command of
+// its own; what the panel says is HTML in it. `messages` build the scene of a saved page; a served one streams them.
 function clamp3dViewer(messages, done) {
   const $ = (id) => document.getElementById(id);
-  const pane = $("meshcat-pane");
-  if (!done && location.protocol !== "file:") setTimeout(() => location.reload(), 1000);
+  const pane = $("meshcat-pane"), served = location.protocol !== "file:" && !messages.length;
   let viewer;
   try {
     viewer = new MeshCat.Viewer(pane);
   } catch (error) {
     // Without WebGL the panel is the page; what it says is in the HTML already.
     $("no3d").hidden = false;
+    if (served && !done) setTimeout(() => location.reload(), 2000);
     return;
   }
   document.body.classList.remove("no3d");
@@ -19,6 +19,7 @@ function clamp3dViewer(messages, done) {
   const size = viewer.set_3d_pane_size.bind(viewer);
   viewer.set_3d_pane_size = (w, h) => size(w || pane.clientWidth || 1, h || pane.clientHeight || 1);
   new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
+  viewer.renderer.domElement.setAttribute("role", "img");
   const dark = matchMedia("(prefers-color-scheme: dark)");
   function background() {
     const [top, bottom] = dark.matches ? [[0.13, 0.16, 0.19], [0.08, 0.1, 0.12]] : [[0.93, 0.95, 0.97], [1, 1, 1]];
@@ -28,129 +29,147 @@ function clamp3dViewer(messages, done) {
   dark.addEventListener("change", background);
 
   let story = null;
-  let stop = -1;
-  let before = 0;
   let touched = false;  // whether the user has moved the camera or picked a finding
-
+  let picked = null;  // the key and the names of what is picked: a finding or a row
+  let identified = "";  // the part that was clicked
+  const looks = {};  // what the user chose for a part: "ghost" or "hide"
+  const root = () => viewer.scene_tree.find(["clamp3d"]).object;
   // Unlike scene_tree.find, this makes no node that is not there.
   const split = (path) => path.split("/").filter((x) => x);
-  const node = (path) => split(path).reduce((n, name) => n && n.children[name], viewer.scene_tree);
+  const node = (path) => split("clamp3d/" + path).reduce((n, name) => n && n.children[name], viewer.scene_tree);
   const show = (path, on) => {
     const n = node(path);
     if (n) { n.set_property("visible", on); viewer.set_dirty(); }
+  };
+  // Labels come when their pictures are decoded; until then there is no node of theirs.
+  const showSprite = (path, on) => { viewer.scene_tree.find(split("clamp3d/" + path)).set_property("visible", Boolean(on)); viewer.set_dirty(); };
+  const names = () => Object.keys(story.paths);
+  const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const soft = () => (calm() ? 0 : 700);
+  // How pairs stand at a moment of the time line: the program measures when it is asked. Null on a saved page.
+  const ask = async (query) => {
+    if (!served || !story.done) return null;
+    try {
+      const answer = await fetch("answer?" + new URLSearchParams(query));
+      return answer.ok ? (await answer.json()).rows : null;
+    } catch (error) { return null; }  // the program has ended
   };
 
   // Switches
   const switches = {};
   function addSwitch(name, on, set) {
-    if (!switches[name]) switches[name] = { on, touched: false };
-    const own = switches[name];
-    const box = document.createElement("input");
+    const own = switches[name] || (switches[name] = { on, touched: false });
+    const label = document.createElement("label"), box = label.appendChild(document.createElement("input"));
     box.type = "checkbox";
     box.id = "switch-" + name.replace(/\W+/g, "-");
     box.checked = own.on;
     own.apply = () => set(own.on);
     box.addEventListener("change", () => { own.on = box.checked; own.touched = true; own.apply(); });
-    const label = document.createElement("label");
-    label.append(box, " " + name);
+    label.append(" " + name);
     $("switches").append(label);
     own.apply();
   }
   function addSwitches() {
-    if (story.cut) addSwitch("cutaway", story.cut_open, (on) => { show("/clamp3d/cutaway", on); show("/clamp3d/whole", !on); });
-    addSwitch("labels", Object.keys(story.nodes).length <= 14, (on) => show("/clamp3d/labels", on));
-    addSwitch("contacts", true, (on) => show("/clamp3d/contacts", on));
-    addSwitch("gaps", true, (on) => show("/clamp3d/gaps", on));
-    if (story.forces.length) addSwitch("forces", true, (on) => show("/clamp3d/forces", on));
-    for (const o of story.overlays) addSwitch(o.name, false, (on) => show(o.path, on));
+    addSwitch("labels", names().length <= 14, () => names().forEach(showLabel));
+    for (const kind of ["contacts", "gaps", "forces"]) if (kind !== "forces" || story.forces.length) addSwitch(kind, true, (on) => show(kind, on));
+    for (const title of story.overlays) addSwitch(title, false, (on) => names().forEach((name) => show(story.paths[name] + "/" + title, on)));
     addSwitch("scene tree", false, (on) => $("stage").classList.toggle("tree", on));
   }
+  const inPicked = (name) => Boolean(picked && picked.names && picked.names.includes(name));
+  const showLabel = (name) => showSprite(story.paths[name] + "/label", !looks[name] && (picked && picked.names ? inPicked(name) : switches.labels.on));
 
-  // Parts: shown as they are, faint (seen through) or hidden.
-  const own = {};  // what the user chose for a part: "ghost" or "hide"
-  function look(name, how) {
-    for (const path of story.nodes[name].filter((p) => !p.startsWith("/clamp3d/labels"))) {
-      const n = node(path);
-      if (n) n.object.traverse((o) => {
-        if (!o.material) return;
-        if (!o.plain) o.plain = { opacity: o.material.opacity, transparent: o.material.transparent, depthWrite: o.material.depthWrite, visible: true };
-        Object.assign(o.material, how ? { opacity: 0.13 * o.plain.opacity, transparent: true, depthWrite: false, visible: how !== "hide" } : o.plain);
-        o.material.needsUpdate = true;
-      });
-    }
-    show("/clamp3d/labels/" + name, !how);
+  // Parts: as they are, see-through (so that what they overlap is seen in them), ghosts, or hidden.
+  const OPACITY = { through: 0.45, ghost: 0.13, hide: 0 };
+  function look(name) {
+    const how = looks[name] || (!picked || !picked.names ? "" : !inPicked(name) ? "ghost" : picked.through ? "through" : "");
+    node(story.paths[name]).object.traverse((o) => {
+      if (!o.material || o.isSprite) return;
+      if (!o.plain) o.plain = { opacity: o.material.opacity, transparent: o.material.transparent, depthWrite: o.material.depthWrite, visible: true };
+      Object.assign(o.material, how ? { opacity: OPACITY[how] * o.plain.opacity, transparent: true, depthWrite: false, visible: how !== "hide" } : o.plain);
+      o.material.needsUpdate = true;
+    });
+    showLabel(name);
   }
-
-  // Parts that a finding names stand out: the others are seen through.
-  function highlight(names) {
-    if (!names) for (const name of Object.keys(own)) delete own[name];
-    for (const name of Object.keys(story.nodes)) look(name, own[name] || (names && !names.includes(name) ? "ghost" : ""));
+  // What is picked stands out: other parts are ghosts, and only its own marks are drawn.
+  function highlight() {
+    names().filter((name) => node(story.paths[name])).forEach(look);
+    const own = picked && picked.names;
     for (const group of ["contacts", "gaps", "forces"]) {
-      const n = node("/clamp3d/" + group);
-      for (const marks of n ? Object.values(n.children) : []) {
+      for (const marks of Object.values((node(group) || { children: {} }).children)) {
         for (const [pair, mark] of Object.entries(marks.children)) {
-          mark.object.visible = !names || pair === names.join("-") || pair === [...names].reverse().join("-");
+          mark.object.visible = !own || pair === own.join("-") || pair === [...own].reverse().join("-");
           const value = mark.children.value;
           if (!value) continue;
           if (value.plain === undefined) value.plain = value.object.visible;
-          value.object.visible = Boolean(names) || value.plain;
+          value.object.visible = Boolean(own) || value.plain;
         }
       }
     }
-    show("/clamp3d/labels", Boolean(names) || switches.labels.on);
-    $("home").hidden = !names && !Object.keys(own).length;
+    $("home").hidden = !own && !Object.keys(looks).length;
     viewer.set_dirty();
   }
 
-  // The list of findings holds those of one part, or all.
-  function filter(name) {
+  // The list of findings holds those with a part whose name has the text of the search field; of a clicked part, its own.
+  function filter() {
+    const text = $("search") ? $("search").value.trim().toLowerCase() : "";
+    const fits = (name) => (identified ? name === identified : name.toLowerCase().includes(text));
     const rows = [...document.querySelectorAll("#findings > li")];
-    const names = (li) => [...li.querySelectorAll(".finding")].flatMap(({ dataset }) => [story.findings[dataset.k].a, story.findings[dataset.k].b]);
-    for (const li of rows) li.hidden = Boolean(name) && !names(li).includes(name);
-    const left = rows.filter((li) => !li.hidden).length;
-    if (rows.length) $("filtered").textContent = name ? ` - ${left || "none"} with ${name}, of ${rows.length}` : "";
+    const within = (li) => [...li.querySelectorAll(".finding")].flatMap(({ dataset }) => [story.findings[dataset.k].a, story.findings[dataset.k].b]);
+    for (const li of rows) li.hidden = !within(li).some(fits);
+    for (const part of document.querySelectorAll(".part")) part.parentElement.hidden = !identified && !fits(part.dataset.part);
+    const left = rows.filter((li) => !li.hidden).length, what = identified || (text && `"${text}"`);
+    if (rows.length) $("filtered").textContent = what ? ` - ${left || "none"} with ${what}, of ${rows.length}` : "";
   }
 
   // A click on a part, in the picture or in the list, names it and offers to isolate, ghost or hide it.
-  let identified = "";
   function identify(name) {
     identified = name;
-    for (const e of document.querySelectorAll(".part")) e.classList.toggle("now", e.dataset.part === name);
+    for (const e of document.querySelectorAll(".part")) mark(e, e.dataset.part === name);
     $("identity").hidden = !name;
     $("identity").firstElementChild.textContent = name;
-    filter(name);
+    filter();
   }
-  $("identity").addEventListener("click", (e) => {
-    const how = e.target.dataset.do;
-    if (!how) return;
+  function mark(element, on) {
+    element.classList.toggle("now", on);
+    if (on) element.setAttribute("aria-current", "true"); else element.removeAttribute("aria-current");
+  }
+  function change(how) {
     touched = true;
-    if (how === "isolate") highlight([identified]);
-    else { own[identified] = how; look(identified, how); $("home").hidden = false; viewer.set_dirty(); }
-  });
-  const root = () => viewer.scene_tree.find(["clamp3d"]).object;
+    if (how === "isolate") picked = { key: "", names: [identified] };
+    else looks[identified] = how;
+    highlight();
+  }
+  $("identity").addEventListener("click", (e) => { if (e.target.dataset.do) change(e.target.dataset.do); });
+
   const render = viewer.render.bind(viewer);
   viewer.render = () => { spreadLabels(viewer, root()); render(); };
-  const section = sectionTool($, viewer, root);
-  const measure = measureTool($, viewer, root, () => story.facets, (a, b) => {
-    const row = story.stops[Math.max(0, stop)].rows.find((r) => (r.a === a && r.b === b) || (r.a === b && r.b === a));
+  const section = sectionTool($, viewer, root, () => names().map((name) => [name, node(story.paths[name])]).filter(([name, n]) => n && !(story.uncut || []).includes(name)).map(([, n]) => n.object));
+  const measure = measureTool($, viewer, root, () => story.facets, async (a, b) => {
+    const rows = await ask({ time: animator.time, a, b }) || (story.stops[times.stop()] || { rows: [] }).rows;
+    const row = rows.find((r) => (r.a === a && r.b === b) || (r.a === b && r.b === a));
     return row ? "; the parts: " + row.gap : "";
   });
+  // The nearest part under a point of the picture. What is cut open is met on the cut, where its inside is seen.
   function hitAt(x, y) {
     const box = viewer.renderer.domElement.getBoundingClientRect(), T = MeshCat.THREE, ray = new T.Raycaster();
     ray.setFromCamera(new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), viewer.camera);
-    let nearest = null;
-    for (const [name, paths] of Object.entries(story.nodes)) for (const path of paths.filter((p) => /^\/clamp3d\/(whole|cutaway)\//.test(p))) {
-      const n = node(path);
-      if (!n || own[name] === "hide" || !node(path.split("/").slice(0, 3).join("/")).object.visible) continue;
-      const meshes = [];
-      n.object.traverse((o) => { if (o.isMesh) meshes.push(o); });
-      const hit = ray.intersectObjects(meshes, false).find((h) => viewer.renderer.clippingPlanes.every((p) => p.distanceToPoint(h.point) >= 0));
-      if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { name, distance: hit.distance, point: hit.point };
+    let nearest = { name: "", point: null, distance: Infinity };
+    for (const name of names()) {
+      const n = node(story.paths[name] + "/solid");
+      if (!n || looks[name] === "hide") continue;
+      const solid = n.children["<object>"].object, planes = solid.material.clippingPlanes || [];
+      const hit = ray.intersectObject(solid, false).find((h) => planes.every((p) => p.distanceToPoint(h.point) >= 0));
+      if (!hit) continue;
+      const inside = hit.face.normal.clone().transformDirection(solid.matrixWorld).dot(ray.ray.direction) > 0;
+      const point = (inside && planes.length && ray.ray.intersectPlane(planes[0], new T.Vector3())) || hit.point;
+      const distance = point.distanceTo(ray.ray.origin);
+      if (distance < nearest.distance) nearest = { name, point, distance };
     }
-    return nearest || { name: "", point: null };
+    return nearest;
   }
   let pressed = null;
-  pane.addEventListener("pointerdown", (e) => { pressed = [e.clientX, e.clientY]; });
+  pane.addEventListener("pointerdown", (e) => { pressed = [e.clientX, e.clientY]; touched = true; flight++; });
+  pane.addEventListener("wheel", () => { touched = true; flight++; }, { passive: true });
   pane.addEventListener("pointerup", (e) => {
     if (story && pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) {
       const hit = hitAt(e.clientX, e.clientY);
@@ -195,182 +214,124 @@ function clamp3dViewer(messages, done) {
   // Everything at a stop, or of the way to the next one.
   let framed = "";
   function home(time, turn) {
-    if (!story || !story.frame) return;
-    const i = Math.max(0, stop), playing = story.done && animator.playing;
-    const boxes = playing && story.stops[i + 1] ? [story.stops[i], story.stops[i + 1]] : [story.stops[i]];
-    const corner = (pick, key) => [0, 1, 2].map((k) => pick(...boxes.map((b) => b[key][k])));
-    framed = i + " " + boxes.length;
+    if (!story) return;
+    const boxes = times.around(), corner = (pick, key) => [0, 1, 2].map((k) => pick(...boxes.map((b) => b[key][k])));
+    framed = String(boxes.map((b) => b.arrive));
     fly(corner(Math.min, "low"), corner(Math.max, "high"), turn ? story.frame.eye : null, time);
   }
   function follow() {
-    const moves = story.done && animator.playing && story.stops[stop + 1] ? 2 : 1;
-    if (!touched && stop >= 0 && framed !== stop + " " + moves) home(soft());
+    if (!touched && framed !== String(times.around().map((b) => b.arrive))) home(soft());
   }
-  const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const soft = () => (calm() ? 0 : 700);
 
-  function pick(element, names, low, high) {
-    for (const e of document.querySelectorAll(".finding.now, .rows tr.now")) e.classList.remove("now");
+  // The address names what is seen: #finding=ID&camera=x,y,z,x,y,z (where it stands, what it is aimed at).
+  const address = () => new URLSearchParams(location.hash.slice(1));
+  function remember() {
+    const hash = new URLSearchParams(picked && picked.id ? { finding: picked.id } : {});
+    if (touched) hash.set("camera", [...viewer.camera.position.toArray(), ...viewer.controls.target.toArray()].map((x) => x.toFixed(4)));
+    try { history.replaceState(null, "", String(hash) ? "#" + hash : location.pathname + location.search); } catch (error) { /* not everywhere for a file */ }
+  }
+  viewer.controls.addEventListener("end", remember);
+  function openAddress() {
+    const id = address().get("finding"), camera = (address().get("camera") || "").split(",").map(Number);
+    const finding = id && [...document.querySelectorAll(".finding")].find((e) => e.dataset.id === id);
+    if (finding && !finding.classList.contains("now")) open(finding);
+    if (camera.length !== 6 || !camera.every(Number.isFinite)) return Boolean(id);
+    flight++;
     touched = true;
-    if (element) element.classList.add("now");
-    highlight(names);
+    viewer.camera.position.set(...camera.slice(0, 3));
+    viewer.controls.target.set(...camera.slice(3));
+    viewer.set_dirty();
+    return true;
+  }
+  addEventListener("hashchange", openAddress);
+
+  // Pick a finding, a row of a moment or nothing, and fly there.
+  function pick(element, what, low, high) {
+    for (const e of document.querySelectorAll(".finding.now, .rows tr.now")) mark(e, false);
+    picked = what;
+    touched = Boolean(element);
+    if (element) mark(element, true);
+    else for (const name of Object.keys(looks)) delete looks[name];
+    highlight();
     if (low) fly(low, high, null, soft());
-    else { touched = false; home(soft()); }
+    else home(soft());
+    setTimeout(remember, soft() + 50);
   }
+  const BAD = ["clash", "contained", "duplicate"];
+  function open(element) {
+    const f = story.findings[Number(element.dataset.k)];
+    times.curve(f);
+    if (!$("timeline").hidden) times.go(f.stop);
+    pick(element, { key: element.dataset.k, id: f.group, names: f.a ? [f.a, f.b] : null, through: BAD.includes(f.verdict) }, f.low, f.high);
+    if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
+  }
+  function openRow(tr) {
+    const r = times.rows().find((r) => r.a === tr.dataset.a && r.b === tr.dataset.b);
+    const points = [r.point_a, r.point_b].filter((p) => p);
+    const margin = 0.05 * Math.max(...story.frame.high.map((x, i) => x - story.frame.low[i]));
+    const corner = (pick, sign) => [0, 1, 2].map((i) => pick(...points.map((p) => p[i])) + sign * margin);
+    const [low, high] = points.length ? [corner(Math.min, -1), corner(Math.max, 1)] : [story.frame.low, story.frame.high];
+    times.curve(null);
+    pick(tr, { key: "", names: [r.a, r.b], through: BAD.includes(r.verdict) }, low, high);
+  }
+  function clear() { identify(""); $("search") && ($("search").value = ""); filter(); measure.clear(); times.curve(null); pick(null, null); }
   $("story").addEventListener("click", (e) => {
-    const part = e.target.closest(".part");
-    if (part) {
-      const shown = part.classList.contains("now");
-      identify(shown ? "" : part.dataset.part);
-      touched = true;
-      return highlight(shown ? null : [part.dataset.part]);
-    }
-    const finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
-    const again = (finding || row) && (finding || row).classList.contains("now");
-    drawCurve(again || !finding ? null : story.findings[Number(finding.dataset.k)]);
-    if (again) pick(null);
-    else if (finding) {
-      const f = story.findings[Number(finding.dataset.k)];
-      if (!$("timeline").hidden) go(f.stop);
-      pick(finding, f.a ? [f.a, f.b] : null, f.low, f.high);
-      try { history.replaceState(null, "", "#finding=" + f.group); } catch (error) { /* not everywhere for a file */ }
-      if (innerWidth <= 760) $("stage").scrollIntoView({ block: "start" });
-    } else if (row) {
-      const r = story.stops[Number(row.closest(".stop").dataset.stop)].rows.find((r) => r.a === row.dataset.a && r.b === row.dataset.b);
-      const points = [r.point_a, r.point_b].filter((p) => p);
-      const margin = 0.05 * Math.max(...story.frame.high.map((x, i) => x - story.frame.low[i]));
-      const corner = (pick, sign) => [0, 1, 2].map((i) => pick(...points.map((p) => p[i])) + sign * margin);
-      if (points.length) pick(row, [r.a, r.b], corner(Math.min, -1), corner(Math.max, 1));
-      else pick(row, [r.a, r.b], story.frame.low, story.frame.high);
-    }
+    const part = e.target.closest(".part"), finding = e.target.closest(".finding"), row = e.target.closest(".rows tr[data-a]");
+    if (part && part.classList.contains("now")) clear();
+    else if (finding) open(finding);
+    else if (row) openRow(row);
+    else if (part) { identify(part.dataset.part); change("isolate"); }
   });
-  addEventListener("hashchange", openFinding);
-  $("home").addEventListener("click", () => { identify(""); drawCurve(null); pick(null); });
-  pane.addEventListener("pointerdown", () => { touched = true; flight++; });
-  pane.addEventListener("wheel", () => { touched = true; flight++; }, { passive: true });
+  $("story").addEventListener("input", (e) => { if (e.target.id === "search") filter(); });
+  $("home").addEventListener("click", clear);
 
-  // Time line
-  const end = () => story.stops[story.stops.length - 1].leave;
-  function mark(s, i) {
-    const a = document.createElement("button");
-    a.textContent = s.mark && s.mark === (story.stops[i - 1] || {}).mark ? "" : s.mark;
-    a.title = s.label;
-    a.classList.toggle("halts", s.halts);
-    a.classList.toggle("end", s.arrive > 0.92 * end());
-    a.style.left = 100 * s.arrive / end() + "%";
-    a.addEventListener("click", () => go(i));
-    return a;
+  const times = timeLine($, () => story, animator, ask, follow);
+  // The next or the previous finding that the list shows.
+  function step(by) {
+    const all = [...document.querySelectorAll("#findings .finding")].filter((e) => e.offsetParent);
+    const next = all[(all.findIndex((e) => e.classList.contains("now")) + by + all.length + (by < 0 && !picked ? 1 : 0)) % all.length];
+    if (next) { open(next); next.scrollIntoView({ block: "nearest" }); }
   }
-  function seek(t) {
-    animator.pause();
-    animator.seek(t);
-    animator.display_progress(t);
-    before = t;
-    refresh();
-  }
-  function go(i) {
-    // A moment later: three.js keeps key times as 32-bit floats, so the exact time may count as before.
-    seek(story.stops[Math.max(0, Math.min(story.stops.length - 1, i))].arrive + 0.005);
-  }
-  function current(t) {
-    let i = 0;
-    while (i + 1 < story.stops.length && story.stops[i + 1].arrive <= t + 1e-6) i++;
-    return i;
-  }
-  // The distance of a picked finding while its motion plays: a band between its bounds, a line at 0 mm.
-  let curve = null;
-  function drawCurve(finding) {
-    curve = (finding && story.curves.find((c) => c.motion === finding.motion && c.a === finding.a && c.b === finding.b)) || null;
-    $("curve").hidden = !curve;
-    if (!curve) return;
-    // The certain side sets the scale: where a depth is hardly bounded the band leaves the picture at its lower edge.
-    const upper = curve.bounds.map((b) => b[1]), low = Math.min(0, ...upper), high = Math.max(0, ...upper);
-    const point = (mm, i) => [1000 * curve.seconds[i] / end(), mm === null ? 1000 : 94 - 90 * (mm - low) / (high - low || 1)];
-    const band = [...curve.bounds.map((b, i) => point(b[1], i)), ...curve.bounds.map((b, i) => point(b[0], i)).reverse()];
-    const zero = point(0, 0)[1];
-    $("curve").firstElementChild.innerHTML = `<line x1="0" x2="1000" y1="${zero}" y2="${zero}"/><polygon points="${band.join(" ")}"/>`;
-    sayCurve();
-  }
-  function sayCurve() {
-    const i = curve.seconds.reduce((best, s, k) => (Math.abs(s - animator.time) < Math.abs(curve.seconds[best] - animator.time) ? k : best), 0);
-    const [lower, upper] = curve.bounds[i];
-    const text = `distance of ${curve.a} and ${curve.b} at t = ${curve.t[i].toFixed(3)}: `
-      + (lower === null ? "" : (Math.floor(lower * 1e4) / 1e4).toFixed(4) + " to ") + (lower === null ? "at most " : "") + (Math.ceil(upper * 1e4) / 1e4).toFixed(4) + " mm";
-    write($("curve").lastElementChild, "", text);
-    write($("curve").firstElementChild, "aria-label", text);
-  }
-  function toggle() {
-    if (animator.playing) animator.pause();
-    else {
-      if (animator.time >= end() - 1e-3) { animator.reset(); before = 0; }
-      animator.play();
-    }
-    refresh();
-  }
-  function showStop(i) {
-    stop = i;
-    for (const e of document.querySelectorAll(".stop")) e.hidden = Number(e.dataset.stop) !== i;
-    [...$("marks").children].forEach((a, k) => a.classList.toggle("now", k === i));
-  }
-  // An attribute, or the text, where it is another: what is written is laid out and painted again, in each frame.
-  function write(element, name, value) {
-    if (!name && element.textContent !== value) element.textContent = value;
-    else if (name && element.getAttribute(name) !== value) element.setAttribute(name, value);
-  }
-  function refresh() {
-    if (!story || !story.done || $("timeline").hidden) return;
-    const t = animator.time;
-    if (animator.playing) {
-      const halt = story.stops.find((s) => s.halts && before < s.arrive && s.arrive <= t);
-      if (halt) return seek(halt.arrive + 0.005);
-      before = t;
-    }
-    const i = current(t), s = story.stops[i], next = story.stops[i + 1];
-    write($("time"), "max", String(end()));
-    if (document.activeElement !== $("time") || animator.playing) $("time").value = t;
-    write($("play").firstElementChild.firstElementChild, "d", animator.playing ? "M3 2h4v12H3zM9 2h4v12H9z" : "M3 1l11 7-11 7z");
-    const moving = next && t > s.leave + 1e-6;
-    const at = moving ? next : s;
-    write($("label"), "", (story.stops.indexOf(at) + 1) + "/" + story.stops.length + "  " + (moving ? "moving to: " : "") + at.label);
-    write($("step"), "", at.label.startsWith(at.step) ? "" : "step " + at.step);
-    if (i !== stop) showStop(i);
-    if (curve) sayCurve();
-    follow();
-  }
-  (function frame() { refresh(); requestAnimationFrame(frame); })();
-
-  $("time").addEventListener("input", () => seek(Number($("time").value)));
-  $("play").addEventListener("click", toggle);
-  $("back").addEventListener("click", () => { const i = current(animator.time); go(animator.time > story.stops[i].arrive + 0.05 ? i : i - 1); });
-  $("forward").addEventListener("click", () => go(current(animator.time) + 1));
+  const KEYS = {
+    Escape: clear, h: clear, n: () => step(1), p: () => step(-1), m: () => $("measure").click(),
+    i: () => identified && change("isolate"), g: () => identified && change("ghost"), x: () => identified && change("hide"),
+    "/": () => $("search") && $("search").focus(), ArrowRight: times.next, ArrowLeft: times.back, " ": times.toggle,
+  };
   document.addEventListener("keydown", (e) => {
-    if (e.key === "h" || e.key === "Escape") { identify(""); measure.clear(); drawCurve(null); pick(null); }
-    if (e.key === "m" && e.target.tagName !== "INPUT") $("measure").click();
-    if ($("timeline").hidden || e.target.tagName === "INPUT" && e.target.type !== "checkbox") return;
-    if (e.key === "ArrowRight") $("forward").click();
-    else if (e.key === "ArrowLeft") $("back").click();
-    else if (e.key === " " && !["BUTTON", "INPUT", "SUMMARY"].includes(e.target.tagName)) { toggle(); e.preventDefault(); }
+    const typing = e.target.tagName === "INPUT" && e.target.type !== "checkbox" || e.target.tagName === "SELECT";
+    if (e.ctrlKey || e.metaKey || e.altKey || typing && e.key !== "Escape") return;
+    if (e.key === " " && ["BUTTON", "INPUT", "SUMMARY"].includes(e.target.tagName)) return;
+    if (KEYS[e.key]) { KEYS[e.key](); e.preventDefault(); }
   });
 
+  // Another state of the story: what was picked, typed and opened stays.
   function showStory(data) {
+    const first = !story, search = $("search") ? { text: $("search").value, focus: document.activeElement === $("search") } : {};
+    const opened = [...document.querySelectorAll("details.members[open]")].map((e) => e.dataset.id);
     story = data;
     $("story").innerHTML = story.panel;
     document.title = story.title + " - clamp3d";
+    viewer.renderer.domElement.setAttribute("aria-label", "3D view of " + story.title + ". All that it shows is listed beside it.");
     addSwitches();
-    if (story.frame) section.reset(story.frame.low, story.frame.high);
-    $("timeline").hidden = !(story.done && story.stops.length > 1);
-    $("marks").replaceChildren(...(story.done && story.stops.length > 1 ? story.stops.map(mark) : []));
-    stop = -1;
-    if (story.stops.length) showStop(story.done ? 0 : story.stops.length - 1);
-    // The panel says it; the caption is for meshcat's own page.
-    viewer.scene_tree.find(["clamp3d", "caption"]).set_property("visible", false);
-    if (!touched) setTimeout(() => { viewer.set_3d_pane_size(); if (!touched) home(0, true); openFinding(); }, 30);
-  }
-  // The address can name a finding: #finding=ID.
-  function openFinding() {
-    const id = new URLSearchParams(location.hash.slice(1)).get("finding");
-    const finding = id && [...document.querySelectorAll(".finding")].find((e) => e.dataset.id === id);
-    if (finding && !finding.classList.contains("now")) finding.click();
+    if (search.text && $("search")) $("search").value = search.text;
+    if (search.focus && $("search")) $("search").focus();
+    for (const e of document.querySelectorAll("details.members")) e.open = opened.includes(e.dataset.id);
+    section.reset(story.frame.low, story.frame.high, first && story.uncut ? "Y" : null);
+    times.reset();
+    showSprite("caption", false);  // the panel says it; the caption is for meshcat's own page
+    const now = picked && picked.id && [...document.querySelectorAll(".finding")].find((e) => e.dataset.id === picked.id);
+    if (now) mark(now, true);
+    filter();
+    setTimeout(() => {
+      viewer.set_3d_pane_size();
+      if (picked) return highlight();
+      if (touched) return;
+      home(0, true);
+      const worst = document.querySelector(".finding");
+      // The worst clash is what a reviewer comes for; where the motions are about to play, they stop at theirs.
+      const still = story.done && (story.stops.length === 1 || calm());
+      if (!openAddress() && still && worst && BAD.includes(story.findings[0].verdict)) open(worst);
+    }, 30);
   }
 
   // Parts of one shape share its geometry: it comes once, by its uuid, and is made for the first object that has it.
@@ -390,14 +351,14 @@ function clamp3dViewer(messages, done) {
     if (command.type === "set_property" && command.path === "/Background") return background();
     if (command.type === "set_geometry") geometries[command.path] = { data: command.geometry };
     else if (command.type === "set_object") setObject(command);
+    else if (command.type === "set_story") showStory(command.value);
     else handle(command);
     if (command.type === "set_animation" && calm()) animator.pause();  // it waits for the button (WCAG 2.2.2)
-    if (command.type === "set_property" && command.property === "story" && command.path === "/clamp3d") showStory(command.value);
-    else if (command.type === "set_property" && command.property === "visible") {
+    if (command.type === "set_property" && command.property === "visible") {
       // A switch that the user has set outlasts what the program sends.
       for (const s of Object.values(switches)) if (s.touched) s.apply();
     }
   };
-
   for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
+  if (served) viewer.connect();
 }

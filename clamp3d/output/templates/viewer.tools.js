@@ -1,16 +1,17 @@
 "use strict";
-// Over the picture: a plane that cuts everything open, the distance between two clicked points, labels kept apart.
-// `scene` is the node that holds all in mm; `say` shows a line of text over the picture.
+// Over the picture: a plane that cuts parts open, the distance between two clicked points, labels kept apart.
+// `scene` is the node that holds all in mm.
 
-// What lies before the plane is not drawn. Returns its `reset(low, high)`: the box that it moves in.
-function sectionTool($, viewer, scene) {
+// Of the parts that `parts()` lists, what lies before the plane is not drawn. Returns its `reset(low, high, axis)`: the
+// box that it moves in, and the axis to begin with.
+function sectionTool($, viewer, scene, parts) {
   const T = MeshCat.THREE, plane = new T.Plane();
   const [axis, at, flip, place] = ["section-axis", "section-at", "section-flip", "section-place"].map($);
   let low, high, side = -1;
+  viewer.renderer.localClippingEnabled = true;
   function cut() {
     const on = Boolean(axis.value), k = "XYZ".indexOf(axis.value);
     for (const e of [at, flip, place]) e.hidden = !on;
-    viewer.renderer.clippingPlanes = on ? [plane] : [];
     if (on) {
       const mm = low[k] + Number(at.value) * (high[k] - low[k]), unit = [0, 1, 2].map((i) => (i === k ? 1 : 0));
       place.textContent = axis.value + " " + mm.toFixed(2) + " mm";
@@ -23,26 +24,49 @@ function sectionTool($, viewer, scene) {
     viewer.set_dirty();
   }
   // Backs of faces in one colour, without light, look like the material that is cut.
-  const insides = [];
+  let insides = [];
   function fill(on) {
-    if (on === insides.length > 0) return;
-    for (const inside of insides.splice(0)) inside.parent.remove(inside);
-    const solid = [];
-    if (on) scene().traverse((o) => { if (o.isMesh && o.material && o.material.color) solid.push(o); });
-    for (const o of solid) {
-      const inside = new T.Mesh(o.geometry, new T.MeshBasicMaterial({ side: T.BackSide, color: o.material.color.clone().multiplyScalar(0.6) }));
-      o.add(inside);
-      insides.push(inside);
+    for (const inside of insides) if (inside.parent) inside.parent.remove(inside);
+    insides = [];
+    for (const part of parts()) {
+      const solids = [];
+      part.traverse((o) => {
+        if (o.material && !o.isSprite) o.material.clippingPlanes = on ? [plane] : null;
+        if (o.isMesh && o.parent.name === "solid") solids.push(o);
+      });
+      for (const o of on ? solids : []) {
+        // A little nearer than it is, so that edges behind it do not shine through.
+        const look = { side: T.BackSide, color: o.material.color, clippingPlanes: [plane], polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -8 };
+        const inside = new T.Mesh(o.geometry, new T.MeshBasicMaterial({ ...look, transparent: o.material.transparent, opacity: o.material.opacity }));
+        inside.raycast = () => {};
+        o.add(inside);
+        insides.push(inside);
+      }
     }
   }
-  axis.addEventListener("change", () => { at.value = 0.5; cut(); });
+  // The half that is nearer to the camera is taken away.
+  function choose() {
+    at.value = 0.5;
+    const k = "XYZ".indexOf(axis.value), middle = [0, 1, 2].map((i) => (low[i] + high[i]) / 2);
+    const eye = scene().worldToLocal(viewer.camera.getWorldPosition(new T.Vector3())).toArray();
+    side = eye[k] > middle[k] ? -1 : 1;
+    cut();
+  }
+  axis.addEventListener("change", choose);
   at.addEventListener("input", cut);
   flip.addEventListener("click", () => { side = -side; cut(); });
-  return { reset(l, h) { [low, high] = [l, h]; $("section").hidden = false; if (axis.value) cut(); } };
+  return {
+    reset(l, h, first) {
+      [low, high] = [l, h];
+      $("section").hidden = false;
+      if (first) { axis.value = first; side = first === "Y" ? 1 : -1; }
+      if (axis.value) cut();
+    },
+  };
 }
 
 // Two clicks while the button is down: a line between them, and in words what is known of the two parts.
-function measureTool($, viewer, scene, facets, known) {
+function measureTool($, viewer, scene, facets, distance) {
   const T = MeshCat.THREE, button = $("measure"), drawn = new T.Group();
   let ends = [];
   const active = () => button.getAttribute("aria-pressed") === "true";
@@ -53,7 +77,7 @@ function measureTool($, viewer, scene, facets, known) {
     button.setAttribute("aria-pressed", String(!active()));
     if (active()) say("Click two points.");
   });
-  function click(name, world) {
+  async function click(name, world) {
     if (ends.length === 2) clear();
     if (!name) return say("Click a part.");
     ends.push({ name, at: scene().worldToLocal(world.clone()) });
@@ -65,10 +89,12 @@ function measureTool($, viewer, scene, facets, known) {
     viewer.set_dirty();
     if (ends.length === 1) return say(name + ": click the other point.");
     const [p, q] = ends.map((e) => e.at), along = q.clone().sub(p);
-    const parts = ends[0].name === ends[1].name ? "" : known(ends[0].name, ends[1].name);
     const [x, y, z] = along.toArray().map((v) => v.toFixed(2).replace("-0.00", "0.00"));
-    say(`${ends[0].name} to ${ends[1].name}: ${along.length().toFixed(2)} mm between the points, within ${(2 * facets()).toFixed(2)} mm `
-      + `(X ${x}, Y ${y}, Z ${z})${parts}`);
+    const [first, second] = ends, words = `${first.name} to ${second.name}: ${along.length().toFixed(2)} mm between the points, `
+      + `within ${(2 * facets()).toFixed(2)} mm (X ${x}, Y ${y}, Z ${z})`;
+    say(words);
+    const parts = first.name === second.name ? "" : await distance(first.name, second.name);
+    if (ends[1] === second) say(words + parts);
   }
   return { active, click, clear() { button.setAttribute("aria-pressed", "false"); clear(); } };
 }
@@ -81,7 +107,7 @@ function spreadLabels(viewer, scene) {
   const projection = viewer.camera.projectionMatrix.elements;
   scene.updateMatrixWorld(true);
   scene.traverseVisible((o) => { if (o.isSprite) labels.push(o); });
-  const isName = (o) => Number(o.parent.parent && o.parent.parent.name === "labels");
+  const isName = (o) => Number(o.parent.name === "label");
   labels.sort((a, b) => isName(a) - isName(b));
   for (const label of labels) {
     at.setFromMatrixPosition(label.matrixWorld).project(viewer.camera);

@@ -1,0 +1,400 @@
+"""What the page shows, as data: stops on a time line with the pairs of that moment, and findings with their places."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+from meshcat.animation import Animation, AnimationFrameVisualizer
+from meshcat.path import Path
+
+from clamp3d.baselines.model import ContactModel
+from clamp3d.clamp.contact import NONE, measure_contacts
+from clamp3d.clamp.dimensions import TITLES, Clamp
+from clamp3d.clamp.result import Waypoint
+from clamp3d.clamp.scene import CONTACT, clamp_scene
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.distance import measure
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import BAD, CheckResult, PairResult
+from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Verdict
+from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import Array, rotation
+from clamp3d.output.groups import grouped
+from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.section import edge_openings, part_anchor
+from clamp3d.output.wording import (
+    circumstances,
+    distance_text,
+    first_text,
+    group_sentence,
+    sentence,
+    titles,
+    worst_first,
+)
+
+Poses: TypeAlias = Mapping[str, Array]
+Pair: TypeAlias = tuple[str, str]
+
+CLEARANCE = 5.0
+"""Gap in mm from which two parts of a clamp count as clear."""
+LISTED = 500
+"""Rows of a table on the page; a result's JSON has all."""
+FIRST = "first contact"
+_HOLD = 1.2  # s at each stop
+_FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
+_MOTION, _SAMPLES = 4.0, 24
+"""Seconds of a motion of a scene from t = 0 to 1, and the moments of it that a curve of distances goes through."""
+_MEASURED = 12
+"""Moments of first contact that a motion stops at, and pairs of it that are measured at a moment, at most."""
+_TURN = math.radians(3.0)
+"""Largest turn between two keys: between them the viewer moves parts along chords."""
+_SCREWED = math.pi / 3.0
+"""Largest turn of the nut between two keys, short enough to be unambiguous, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """How a pair stands at a moment; ``contact`` is the scene's threshold, mm: an allowed contact may be open."""
+
+    a: str
+    b: str
+    verdict: str
+    distance: Distance
+    contact: float
+    what: str = ""
+    declared: bool = False
+
+    @classmethod
+    def of(cls, scene: Scene, a: str, b: str, distance: Distance, what: str = "", *, declared: bool = False) -> Row:
+        """A pair with the verdict that its distance has in a scene."""
+        verdict = scene.thresholds.verdict(distance, scene.allowance(a, b)).value
+        return cls(a, b, verdict, distance, scene.contact, what, declared)
+
+    @property
+    def touches(self) -> bool:
+        """Whether the parts are in contact, or overlap."""
+        return self.what == FIRST or self.distance.upper <= self.contact
+
+    @property
+    def gap(self) -> str:
+        """The distance in words."""
+        if self.touches and (self.what == FIRST or abs(self.distance.upper) < 5e-5):
+            return "touching"
+        return distance_text(self.distance, digits=4)
+
+    @property
+    def colour(self) -> str:
+        """The verdict's colour; allowed contact that is not there has that of a gap."""
+        return VERDICT_COLOURS["clearance" if self.verdict == "allowed" and not self.touches else self.verdict]
+
+    @property
+    def near(self) -> bool:
+        """Whether the pair is worth a mark."""
+        return self.declared or self.verdict != "clear"
+
+    def data(self) -> dict[str, Any]:
+        """The row as JSON data."""
+        shown = {"gap": self.gap, "near": self.near, "colour": self.colour}
+        names = {"a": self.a, "b": self.b, "verdict": self.verdict, "what": self.what}
+        return names | self.distance.to_dict() | shown
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A moment on the time line: reached at ``arrive`` s, left at ``leave`` s.
+
+    Attributes
+    ----------
+    step, label, mark : str
+        The motion or step that it belongs to, its name, and what the time line says there.
+    way : callable
+        Where all parts are (4, 4) at a fraction of the way here, from 0 to 1.
+    rows : tuple of Row
+        How pairs stand here.
+    pairs : tuple of (str, str)
+        Those to measure on the way here.
+    keys : int
+        Straight pieces that the way is drawn with.
+    seconds : float, optional
+        How long the way takes.
+    t : float
+        The motion's own time here, from 0 to 1.
+    halts : bool
+        Whether playing halts here.
+    length : (ndarray, ndarray, str), optional
+        One more length to draw: its ends and its name.
+    """
+
+    step: str
+    label: str
+    way: Callable[[float], Poses]
+    rows: tuple[Row, ...]
+    mark: str = ""
+    pairs: tuple[Pair, ...] = ()
+    keys: int = 1
+    seconds: float | None = None
+    t: float = 0.0
+    halts: bool = False
+    length: tuple[Array, Array, str] | None = None
+    arrive: float = 0.0
+    leave: float = 0.0
+
+    @property
+    def poses(self) -> Poses:
+        """Where the parts are here."""
+        return self.way(1.0)
+
+
+@dataclass
+class Timeline:
+    """Stops as they come, each with its time; ``size`` mm is how far a part goes in about two seconds."""
+
+    size: float
+    stops: list[Stop] = field(default_factory=list)
+
+    def add(self, stop: Stop) -> int:
+        """Append a stop and return its number."""
+        arrive = 0.0
+        if self.stops:
+            before = self.stops[-1].poses
+            length = max(np.linalg.norm(T[:3, 3] - before[name][:3, 3]) for name, T in stop.poses.items())
+            seconds = min(_SLOWEST, max(_FASTEST, 2.0 * float(length) / self.size))
+            arrive = self.stops[-1].leave + (seconds if stop.seconds is None else stop.seconds)
+        self.stops.append(replace(stop, arrive=arrive, leave=arrive + _HOLD))
+        return len(self.stops) - 1
+
+    def at(self, seconds: float) -> tuple[Stop, Poses]:
+        """The stop where a moment is, or to which it leads, and where the parts are."""
+        k = min(bisect.bisect_left(self.stops, seconds, key=lambda stop: stop.leave), len(self.stops) - 1)
+        stop = self.stops[k]
+        if k == 0 or seconds >= stop.arrive:
+            return stop, stop.poses
+        start = self.stops[k - 1].leave
+        return stop, stop.way((seconds - start) / (stop.arrive - start))
+
+    def moments(self, step: str | None) -> list[float]:
+        """Moments of a motion, s, even in its own time and with its first contacts."""
+        seconds = []
+        for before, stop in pairwise(self.stops):
+            if stop.step == step:
+                t0 = before.t if before.step == step else 0.0
+                n = max(1, round(_SAMPLES * (stop.t - t0)))
+                seconds += np.linspace(before.leave, stop.arrive, n + 1)[1 if before.step == step else 0 :].tolist()
+        return seconds
+
+    def group(self, number: int) -> str:
+        """What the marks of a stop are called in the scene."""
+        return f"{number + 1} {self.stops[number].label}".replace("/", " ")
+
+    def animation(self, root: str, paths: Mapping[str, str], groups: Iterable[str]) -> Animation:
+        """The animation that plays all stops once.
+
+        ``paths`` below ``root`` lead to the parts; the marks of a stop are below each of ``groups`` and show while the
+        parts rest.
+        """
+        animation = Animation(default_framerate=1)
+        first, last = self.stops[0], self.stops[-1]
+        moving = [name for name, T in first.poses.items() if any(s.poses[name] is not T for s in self.stops)]
+
+        def set_poses(seconds: float, poses: Poses) -> None:
+            frame = AnimationFrameVisualizer(animation, Path((root,)), seconds)
+            for name in moving:
+                frame[paths[name]].set_transform(poses[name])
+
+        for before, stop in zip([first, *self.stops], self.stops, strict=False):
+            for f in np.arange(1, stop.keys) / stop.keys:
+                set_poses(before.leave + f * (stop.arrive - before.leave), stop.way(f))
+            set_poses(stop.arrive, stop.poses)
+            set_poses(stop.leave, stop.poses)
+            for k, group in ((k, group) for k in range(len(self.stops)) for group in groups):
+                is_here = self.stops[k] is stop
+                for seconds, shown in ((stop.arrive, is_here), (stop.leave, is_here and stop is last)):
+                    marks = AnimationFrameVisualizer(animation, Path((root,)), seconds)[f"{group}/{self.group(k)}"]
+                    marks.set_property("visible", "bool", shown)
+        return animation
+
+
+class SceneStory:
+    """A checked scene: at rest, then its motions one after the other, with a stop where parts first touch."""
+
+    subtitle = ""
+    anchors: Mapping[str, Array] | None = None
+    accuracy = "How each distance was measured stands beside it."
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.title, self._cache = scene, scene.name, ModelCache()
+
+    def measure(self, poses: Poses, pairs: Iterable[Pair]) -> list[Row]:
+        """Pairs of the parts at some poses, by the engine that every command uses."""
+        distances = measure(self.scene.moved(poses), pairs, cache=self._cache)
+        return [Row.of(self.scene, *pair, distance) for pair, distance in distances.items()]
+
+    def stops(self, result: CheckResult) -> Iterator[Stop]:
+        """All stops of a result."""
+        motions = self.scene.motions
+        poses: Poses = {part.name: part.T_world for part in self.scene.parts}
+        contact = self.scene.contact
+        rows = tuple(Row(row.a, row.b, row.verdict.value, row.distance, contact) for row in result.pairs)
+        marks = [motion.name for motion in motions] + [""]
+        yield Stop("at rest", "at rest", partial(_same, poses), rows, marks[0])
+        for motion, mark in zip(motions, marks[1:], strict=True):
+            for stop in self._motion(result, motion, poses, mark):
+                yield stop
+                last = stop
+            poses = last.poses
+
+    def _motion(self, result: CheckResult, motion: Motion, start: Poses, next_mark: str) -> Iterator[Stop]:
+        """The stops of a motion: where parts first touch, where they go on to, and the end."""
+        going = motion.resolved(start[motion.parts[0]])
+        rows = worst_first([row for row in result.motions if row.motion == motion.name])
+        pairs = tuple((row.a, row.b) for row in rows[:_MEASURED])
+
+        def at(t: float) -> Poses:
+            return {**start, **{name: going.at(t, start[name]) for name in motion.parts}}
+
+        def between(t0: float, t1: float, f: float) -> Poses:
+            return at(t0 + f * (t1 - t0))
+
+        contacts = first_contacts(rows)
+        for k, (t0, t) in enumerate(pairwise([0.0, *contacts, 1.0])):
+            meets = k < len(contacts)
+            label = f"{motion.name}: end" + (", through the contact" if contacts else "")
+            mark, watched = next_mark, pairs
+            if meets:
+                label = f"{motion.name}: {'next' if k else 'first'} contact at t = {first_text(t)}"
+                mark, watched = "" if k else FIRST, tuple((row.a, row.b) for row in contacts[t])
+            here = tuple(self.measure(at(t), watched))
+            if meets:  # the moment is certain; the distance right there may be certain to the contact threshold only
+                here = tuple(replace(row, verdict="contact", what=FIRST) for row in here)
+            keys = max(1, math.ceil(abs(going.angle) * (t - t0) / _TURN))
+            seconds = max(0.3, _MOTION * (t - t0))
+            way = partial(between, t0, t)
+            yield Stop(motion.name, label, way, here, mark, pairs, keys, seconds, t, halts=meets and k == 0)
+
+
+def _same(poses: Poses, _: float) -> Poses:
+    return poses
+
+
+def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
+    """The pairs that come to touch during a motion where they are not meant to, by the moment; the first dozen."""
+    contacts: dict[float, list[PairResult]] = {}
+    for row in rows:
+        if row.contact_at and row.verdict in (Verdict.CONTACT, *BAD):
+            contacts.setdefault(row.contact_at, []).append(row)
+    return dict(sorted(contacts.items())[:_MEASURED])
+
+
+def findings_of(result: CheckResult, timeline: Timeline, *, brief: bool = False) -> Iterator[dict[str, Any]]:
+    """The findings of a check, group by group, each with its stop and the corners of the box to look at.
+
+    Where parts overlap takes long to compute: of a group it is said of the worst pair, and of none if ``brief``.
+    """
+    names, stops = titles(result.scene), timeline.stops
+    for group in grouped(result):
+        for row in group.rows:
+            own = [k for k, stop in enumerate(stops) if row.motion and stop.step == row.motion]
+            first = [k for k in own if any((r.a, r.b, r.what) == (row.a, row.b, FIRST) for r in stops[k].rows)]
+            stop = [*first, *own[-1:], 0][0]
+            here = [r.distance for r in stops[stop].rows if (r.a, r.b) == (row.a, row.b)] if own else []
+            low, high = focus([*here, row.distance][0])
+            yield {
+                **{"a": row.a, "b": row.b, "motion": row.motion, "verdict": row.verdict.value, "group": group.id},
+                "title": group_sentence(group, names),
+                "text": sentence(row, names),
+                "detail": circumstances(row) if row is group.worst and not brief else "",
+                "moments": timeline.moments(row.motion),
+                **{"stop": stop, "low": low, "high": high},
+            }
+
+
+def focus(distance: Distance) -> tuple[Array, Array]:
+    """Corners of a box around the witness points of a distance."""
+    points = [p for p in (distance.point_a, distance.point_b) if p is not None] or [np.zeros(3)]
+    return np.min(points, axis=0), np.max(points, axis=0)
+
+
+class ClampStory:
+    """The waypoints of a clamp's assembly as stops; ``clearance`` mm is the gap that counts as clear.
+
+    Parameters
+    ----------
+    clamp : Clamp
+    model : ContactModel, optional
+        How grooves are measured; by default exactly.
+    """
+
+    def __init__(self, clamp: Clamp, model: ContactModel | None = None, clearance: float | None = None) -> None:
+        self.clamp, self._model, self._cache = clamp, model, ModelCache()
+        still = {name: np.eye(4) for name in TITLES}
+        self.scene = clamp_scene(clamp, still, clearance=CLEARANCE if clearance is None else clearance)
+        anchors = {name: part_anchor(clamp, name) for name in TITLES}
+        self.anchors: Mapping[str, Array] | None = {name: np.array([u, 0.0, -v]) for name, (u, v) in anchors.items()}
+        self.title, self.subtitle = f"{clamp.name} clamp", f"line {clamp.line.label}, jumper {clamp.jumper.label}"
+        by = "exactly" if model is None or model.name == "cas" else f"by {model.name}"
+        self.accuracy = f"Measured {by}, not on the facets."
+        self._latest: tuple[Poses, float, float] | None = None
+        """Where the parts were last, how far the nut was screwed on at first (mm), and how it was turned (rad)."""
+
+    def measure(self, poses: Poses, pairs: Iterable[Pair]) -> list[Row]:
+        """Pairs of the parts at some poses, by the engine that every command uses."""
+        distances = measure(self.scene.moved(poses), pairs, model=self._model, cache=self._cache)
+        return [Row.of(self.scene, *pair, distance) for pair, distance in distances.items()]
+
+    def stop(self, waypoint: Waypoint) -> Stop:
+        """A waypoint with its 21 pairs; the nut is drawn turned by as much as it has been screwed on."""
+        poses = {name: waypoint.T_world(name) for name in TITLES}
+        rows = [
+            Row.of(self.scene, c.a, c.b, c.distance, "" if c.relation == NONE else c.relation, declared=c.declared != 0)
+            for c in measure_contacts(self.clamp, waypoint.poses, self._model, cache=self._cache)
+        ]
+        rows.sort(key=lambda row: not row.declared)
+        beside = float(np.abs(poses["P4"][:2, 3] - poses["P5"][:2, 3]).max())
+        on = max(0.0, float(poses["P4"][2, 3] - poses["P5"][2, 3]) + self.clamp.nut.height) if beside < CONTACT else 0.0
+        start, first, before = self._latest or (poses, on, 0.0)
+        turn = -self.clamp.bolt.turn(on - first)  # clockwise
+        self._latest = poses, first, turn
+        return Stop(
+            waypoint.step,
+            waypoint.label,
+            partial(_clamp_way, start, poses, before, turn),
+            tuple(rows),
+            waypoint.step,
+            tuple((row.a, row.b) for row in rows),
+            keys=max(1, math.ceil(abs(turn - before) / _SCREWED)),
+            length=self._opening(waypoint),
+        )
+
+    def _opening(self, waypoint: Waypoint) -> tuple[Array, Array, str]:
+        """The distance between the splints (Table 4): its ends, and its length in words."""
+        height = edge_openings(self.clamp, waypoint.poses)[0]
+        top = (waypoint.T_world("P1") @ [0.0, 0.0, -self.clamp.up_splint.thickness, 1.0])[:3]
+        return top, top - [0.0, 0.0, height], f"splints {height:.3f} mm"
+
+
+def _clamp_way(start: Poses, end: Poses, before: float, turn: float, f: float) -> Poses:
+    """Parts at a fraction of a straight way, as the viewer draws them; the nut turns from one angle to another."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    poses = {}
+    for name, T in end.items():
+        poses[name] = T.copy()
+        if f < 1.0:
+            poses[name][:3, 3] = (1.0 - f) * start[name][:3, 3] + f * T[:3, 3]
+            turns = Rotation.from_matrix(np.array([start[name][:3, :3], T[:3, :3]]))
+            poses[name][:3, :3] = Slerp([0.0, 1.0], turns)(f).as_matrix()
+    poses["P5"] = poses["P5"] @ rotation((0.0, 0.0, 1.0), before + f * (turn - before))
+    return poses
+
+
+def worst_pairs(rows: Iterable[PairResult]) -> Sequence[PairResult]:
+    """The rows of a table on the page."""
+    return worst_first(list(rows))[:LISTED]
