@@ -16,14 +16,13 @@ from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.TopAbs import TopAbs_State
 from OCP.TopLoc import TopLoc_Location
-from step_scenes import Tree, location
 
 from clamp3d.files.cad import Key, matrix
 from clamp3d.files.open_cascade import explore
 from clamp3d.files.solid import BrepSolid, require_open_cascade
-from tests.public.placed_pairs import ball, common_volume, cone, cut, moved, ring, rod, shift
-from tests.public.placed_pairs import block as box
-from tests.public.placed_pairs import first_solid as solid_of
+from tests.cad import Tree, ball, common_volume, cone, cut, location, moved, ring, rod, shift
+from tests.cad import block as box
+from tests.cad import first_solid as solid_of
 
 
 def fuse(shape, *others):

@@ -1,63 +1,16 @@
 """STEP assemblies written by Open CASCADE itself: the truth that the reader is held to."""
 
 import numpy as np
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
-from OCP.Interface import Interface_Static
-from OCP.STEPCAFControl import STEPCAFControl_Writer
-from OCP.TCollection import TCollection_ExtendedString
-from OCP.TDataStd import TDataStd_Name
-from OCP.TDocStd import TDocStd_Document
-from OCP.TopLoc import TopLoc_Location
-from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-
-def location(T):
-    move = gp_Trsf()
-    move.SetValues(*np.asarray(T)[:3].flatten().tolist())
-    return TopLoc_Location(move)
+from tests.cad import Tree, block, cut, rod
 
 
 def plate():
-    box = BRepPrimAPI_MakeBox(gp_Pnt(-20, -10, 0), gp_Pnt(20, 10, 5)).Shape()
-    tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(10, 0, -1), gp_Dir(0, 0, 1)), 3.0, 7).Shape()
-    return BRepAlgoAPI_Cut(box, tool).Shape()
+    return cut(block((-20, -10, 0), (20, 10, 5)), rod(3.0, -1, 6, 10, 0))
 
 
 def pin():
-    return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 2.5, 10.0).Shape()
-
-
-class Tree:
-    """An XDE document to which products and instances are added."""
-
-    def __init__(self):
-        self.document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-        XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)
-        self.tool = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
-
-    def product(self, name, shape=None):
-        label = self.tool.NewShape() if shape is None else self.tool.AddShape(shape, False)
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
-        return label
-
-    def put(self, parent, child, T, name="instance"):
-        label = self.tool.AddComponent(parent, child, location(T))
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
-
-    def write(self, path, unit="MM"):
-        self.tool.UpdateAssemblies()
-        writer = STEPCAFControl_Writer()
-        writer.SetNameMode(True)
-        before = Interface_Static.CVal_s("write.step.unit")
-        Interface_Static.SetCVal_s("write.step.unit", unit)
-        try:
-            assert writer.Transfer(self.document)
-            writer.Write(str(path))
-        finally:
-            Interface_Static.SetCVal_s("write.step.unit", before)
-        return path
+    return rod(2.5, 0, 10)
 
 
 def pose(rng):

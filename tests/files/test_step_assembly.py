@@ -10,13 +10,14 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_Sewing
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Compound
-from step_scenes import Tree, location, nested, pin, plate, pose
+from step_scenes import nested, pin, plate, pose
 
 from clamp3d import InputError, export, load
 from clamp3d.files.mesh_file import load_bodies
 from clamp3d.files.open_cascade import explore
 from clamp3d.files.part21 import announced
 from clamp3d.geometry.shells import volume
+from tests.cad import Tree, location
 
 
 @pytest.fixture(scope="module", params=["MM", "INCH"])

@@ -12,7 +12,6 @@ from functools import cache
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
@@ -21,33 +20,32 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_MakeWire,
     BRepBuilderAPI_NurbsConvert,
-    BRepBuilderAPI_Transform,
 )
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepGProp import BRepGProp
 from OCP.BRepPrimAPI import (
-    BRepPrimAPI_MakeBox,
-    BRepPrimAPI_MakeCone,
-    BRepPrimAPI_MakeCylinder,
     BRepPrimAPI_MakePrism,
     BRepPrimAPI_MakeRevol,
-    BRepPrimAPI_MakeSphere,
-    BRepPrimAPI_MakeTorus,
 )
 from OCP.Geom import Geom_BezierCurve
-from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
-from OCP.GProp import GProp_GProps
-from OCP.Interface import Interface_Static
-from OCP.Message import Message
-from OCP.STEPCAFControl import STEPCAFControl_Writer
-from OCP.TCollection import TCollection_ExtendedString
-from OCP.TDataStd import TDataStd_Name
-from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Vec
 from OCP.TopLoc import TopLoc_Location
-from OCP.XCAFDoc import XCAFDoc_DocumentTool
-from scipy.spatial.transform import Rotation
+
+from tests.cad import (
+    Tree,
+    ball,
+    block,
+    cone,
+    cut,
+    first_solid,
+    matrix,
+    moved,
+    random_pose,
+    ring,
+    rod,
+    shift,
+    transformation,
+    turn,
+)
 
 CONTACT = 0.01
 """The contact threshold that the verdicts are for, mm."""
@@ -57,54 +55,6 @@ OVERLAPS = frozenset({"clash", "contained", "duplicate"})
 
 
 # --- Solids -----------------------------------------------------------------------------------------------------------
-
-
-def transformation(T):
-    """A pose (4, 4) as Open CASCADE has it."""
-    move = gp_Trsf()
-    move.SetValues(*(float(x) for x in np.asarray(T)[:3].ravel()))
-    return move
-
-
-def moved(shape, T):
-    """The shape with its geometry moved by T (4, 4)."""
-    return BRepBuilderAPI_Transform(shape, transformation(T), True).Shape()
-
-
-def shift(x=0.0, y=0.0, z=0.0):
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
-
-
-def turn(axis, angle):
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec(angle * np.asarray(axis, float) / np.linalg.norm(axis)).as_matrix()
-    return T
-
-
-def upright(x=0.0, y=0.0, z=0.0):
-    return gp_Ax2(gp_Pnt(x, y, z), gp_Dir(0, 0, 1))
-
-
-def block(low, high):
-    return BRepPrimAPI_MakeBox(gp_Pnt(*map(float, low)), gp_Pnt(*map(float, high))).Shape()
-
-
-def rod(radius, low, high, x=0.0, y=0.0):
-    return BRepPrimAPI_MakeCylinder(upright(x, y, low), radius, high - low).Shape()
-
-
-def cone(bottom, top, low, high):
-    return BRepPrimAPI_MakeCone(upright(0, 0, low), bottom, top, high - low).Shape()
-
-
-def ball(radius, z=0.0):
-    return BRepPrimAPI_MakeSphere(gp_Pnt(0, 0, z), radius).Shape()
-
-
-def ring(major, minor, z=0.0):
-    return BRepPrimAPI_MakeTorus(upright(0, 0, z), major, minor).Shape()
 
 
 def hexagon(apothem, low, high):
@@ -122,15 +72,11 @@ def arch(half_width, height, length):
     """A prism along y under a Bezier curve whose highest point is (0, y, height)."""
     ends = [gp_Pnt(s * half_width, -length / 2, 0) for s in (-1, 1)]
     poles = ends[0], gp_Pnt(0, -length / 2, 2 * height), ends[1]
-    return prism_under(poles, gp_Vec(0, length, 0))
-
-
-def prism_under(poles, along):
-    """The prism between a Bezier curve and its chord."""
-    return BRepPrimAPI_MakePrism(face_under(poles), along).Shape()
+    return BRepPrimAPI_MakePrism(face_under(poles), gp_Vec(0, length, 0)).Shape()
 
 
 def face_under(poles):
+    """The face between a Bezier curve and its chord."""
     try:
         from OCP.collections import Array1_gp_Pnt as Points
     except ModuleNotFoundError:
@@ -150,30 +96,11 @@ def bulge(radius, half_length):
     return BRepPrimAPI_MakeRevol(face_under(poles), axis).Shape()
 
 
-def cut(shape, *tools):
-    for tool in tools:
-        shape = BRepAlgoAPI_Cut(shape, tool).Shape()
-    return shape
-
-
-def first_solid(shape):
-    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    assert explorer.More()
-    return explorer.Current()
-
-
 def bottom_of(shape):
     """The lowest z of a shape, mm."""
     bounds = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, bounds, False, False)
     return bounds.CornerMin().Z()
-
-
-def common_volume(a, b):
-    """The volume that two shapes share, mm^3."""
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(BRepAlgoAPI_Common(a, b).Shape(), properties)
-    return properties.Mass()
 
 
 def drilled(rng, low, high, radius):
@@ -456,72 +383,27 @@ def placed_pair(family, rng, gap=None, splines=0.1):
     return PlacedPair(family, a, b, gap)
 
 
-def random_pose(rng, reach=50.0):
-    T = np.eye(4)
-    T[:3, :3] = Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
-    T[:3, 3] = rng.uniform(-reach, reach, 3)
-    return T
-
-
-class StepFile:
-    """Named solids at poses, written by Open CASCADE as products of one assembly."""
-
-    def __init__(self):
-        messenger = Message.DefaultMessenger_s()
-        for printer in [*messenger.Printers()]:
-            messenger.RemovePrinter(printer)
-        self.document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-        XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)
-        self.tool = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
-        self.root = self._named(self.tool.NewShape(), "assembly")
-
-    def _named(self, label, name):
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-        return label
-
-    def product(self, name, shape):
-        return self._named(self.tool.AddShape(first_solid(shape), False), name)
-
-    def put(self, product, T):
-        place = TopLoc_Location(transformation(T))
-        self._named(self.tool.AddComponent(self.root, product, place), "instance")
-
-    def write(self, path):
-        self.tool.UpdateAssemblies()
-        writer = STEPCAFControl_Writer()
-        writer.SetNameMode(True)
-        Interface_Static.SetCVal_s("write.step.unit", "MM")
-        assert writer.Transfer(self.document)
-        writer.Write(str(path))
-        return path
-
-
 def write_pairs(pairs, path, rng):
     """All pairs in one STEP file, far from each other: its solids are a and b of the first pair, of the second, ...
 
     Each pair stands at a random pose; half of them have it in their geometry, half in their placement. Both solids of a
     duplicate are instances of one product in half of the cases.
     """
-    file, side = StepFile(), math.ceil(len(pairs) ** (1 / 3))
+    tree, side = Tree(), math.ceil(len(pairs) ** (1 / 3))
+    root = tree.product("assembly")
     for k, pair in enumerate(pairs):
         T = shift(*(SPACING * np.array([k % side, k // side % side, k // side**2]))) @ random_pose(rng)
         if rng.random() < 0.5:
             for name, shape in (("a", pair.a), ("b", pair.b)):
-                file.put(file.product(f"{name}{k}", moved(shape, T)), np.eye(4))
+                tree.put(root, tree.product(f"{name}{k}", first_solid(moved(shape, T))), np.eye(4))
         elif pair.family.startswith("duplicate"):
-            shared = file.product(f"twice{k}", pair.a)
-            file.put(shared, T)
-            file.put(shared, T @ matrix(pair.b.Location()))
+            shared = tree.product(f"twice{k}", first_solid(pair.a))
+            tree.put(root, shared, T)
+            tree.put(root, shared, T @ matrix(pair.b.Location()))
         else:
             for name, shape in (("a", pair.a), ("b", pair.b)):
-                file.put(file.product(f"{name}{k}", BRepBuilderAPI_Copy(shape).Shape()), T)
-    return file.write(path)
-
-
-def matrix(location):
-    """The pose (4, 4) of a location."""
-    move = location.Transformation()
-    return np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)] + [[0.0, 0.0, 0.0, 1.0]])
+                tree.put(root, tree.product(f"{name}{k}", first_solid(BRepBuilderAPI_Copy(shape).Shape())), T)
+    return tree.write(path)
 
 
 def judge(pairs, result):

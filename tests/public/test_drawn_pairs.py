@@ -133,7 +133,7 @@ def test_a_wire_at_the_edge_of_contact_is_decided():
 
 def as_cad(name):
     """The bodies below, made by Open CASCADE."""
-    from tests.public.placed_pairs import block, cut, rod
+    from tests.cad import block, cut, rod
 
     return {
         "box": lambda: block((-5, -4, -3), (5, 4, 3)),
@@ -160,7 +160,7 @@ def test_random_poses_as_open_cascade_measures_them(pair):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
-    from tests.public.placed_pairs import common_volume, moved, random_pose
+    from tests.cad import common_volume, moved, random_pose
 
     one, two = pair.split("-")
     rng = np.random.default_rng(len(pair))

@@ -116,12 +116,12 @@ def test_verdicts_of_a_motion_in_a_scene(way, wanted):
 @pytest.fixture(scope="module")
 def plate_and_pin(tmp_path_factory):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from tests.public.placed_pairs import StepFile, block, cut, rod
+    from tests.cad import block, cut, rod, write_parts
 
-    file = StepFile()
-    file.put(file.product("plate", cut(block((-15, -15, -3), (15, 15, 3)), rod(4.1, -4, 4))), np.eye(4))
-    file.put(file.product("pin", rod(4.0, 0, 20)), translation(0, 0, 10))
-    return {part.name: part for part in load(file.write(tmp_path_factory.mktemp("cad") / "pin.step")).parts}
+    path = tmp_path_factory.mktemp("cad") / "pin.step"
+    plate = cut(block((-15, -15, -3), (15, 15, 3)), rod(4.1, -4, 4))
+    write_parts(path, plate=(plate, np.eye(4)), pin=(rod(4.0, 0, 20), translation(0, 0, 10)))
+    return {part.name: part for part in load(path).parts}
 
 
 @pytest.mark.parametrize("aside", [0.0, 0.05])
@@ -136,12 +136,11 @@ def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
 def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
     """What stands out of the facets counts: the lowest line of the cylinder starts 0.05 mm above the plate."""
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from tests.public.placed_pairs import StepFile, block, rod
+    from tests.cad import block, rod, write_parts
 
-    file = StepFile()
-    file.put(file.product("plate", block((-40, -40, -3), (40, 40, 0))), np.eye(4))
-    file.put(file.product("bar", rod(8.0, -6, 6)), np.eye(4))
-    parts = {part.name: part for part in load(file.write(tmp_path / "over.step")).parts}
+    plate, bar = block((-40, -40, -3), (40, 40, 0)), rod(8.0, -6, 6)
+    path = write_parts(tmp_path / "over.step", plate=(plate, np.eye(4)), bar=(bar, np.eye(4)))
+    parts = {part.name: part for part in load(path).parts}
     start = pose((1.0, 0.0, 0.0), math.pi / 2, (-10.0, 0.0, 8.05))
     found = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)
     assert found.distance.lower - 1e-6 <= 0.05 <= found.distance.upper + 1e-6

@@ -10,8 +10,8 @@ from clamp3d import check, load
 from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, judge, placed_pair, write_pairs
 
 GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
-SLOW = {"ring_in_groove", "ball_in_ring"}
-"""Families of free-form faces: one gap on either side of the contact threshold."""
+SLOW = {"ring_in_groove", "ball_in_ring", "thread_in_tube", "ball_in_socket", "spline_in_bore"}
+"""Families of round or free-form faces: one gap on either side of the contact threshold."""
 
 
 def checked(pairs, folder):

@@ -25,7 +25,6 @@ def boxes(tmp_path):
     box = shapes.box(10, 10, 10)
     return {
         "path": tmp_path / "two.glb",
-        "text": str(tmp_path / "two.glb"),
         "list": [("a", box), ("b", box, at)],
         "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), at)],
         "trimesh": scene,
@@ -33,7 +32,7 @@ def boxes(tmp_path):
     }
 
 
-@pytest.mark.parametrize("kind", ["path", "text", "list", "meshes", "trimesh", "scene"])
+@pytest.mark.parametrize("kind", ["path", "list", "meshes", "trimesh", "scene"])
 def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path):
     source = boxes[kind]
     result = clamp3d.check(source)

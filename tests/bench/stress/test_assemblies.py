@@ -13,7 +13,7 @@ from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
 from clamp3d.clamp.section import Section
 
-CLAMPS = 3
+CLAMPS = 2
 
 
 @pytest.mark.parametrize("family", ASSEMBLIES)
@@ -77,6 +77,6 @@ def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
 
 
 def test_the_papers_search_stops_a_step_short():
-    (stepped,), _ = run_family("assembly: random clamps", ["stepped"], 300, 1, 60.0, 0)
-    assert stepped.asked == 3
+    (stepped,), _ = run_family("assembly: random clamps", ["stepped"], 100, 1, 60.0, 0)
+    assert stepped.asked == 1
     assert 1e-4 < stepped.worst_error < 3.0

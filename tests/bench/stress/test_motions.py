@@ -13,7 +13,7 @@ from clamp3d.bench.stress.motions import MOTIONS, TRUTH_ERROR, least_distance, t
 from clamp3d.bench.stress.poses.cases import Cases, Shapes
 from clamp3d.bench.stress.run import run_family
 
-CASES = 5  # the campaign of docs/methods.md has 100 000
+CASES = 3  # the campaign of docs/methods.md has 100 000
 
 
 @pytest.mark.parametrize("family", MOTIONS)

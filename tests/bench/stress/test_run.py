@@ -131,15 +131,15 @@ class _Fatal:
         return Measured(cases.gap, cases.gap * np.nan, np.zeros(len(cases), bool))
 
 
-_BAD = POSES["tangency"].cases(6, 0).gap[[2, 4]]
+_BAD = POSES["tangency"].cases(4, 0).gap[[1, 3]]
 
 
 def test_a_method_that_ends_the_interpreter_is_counted():
-    cases = POSES["tangency"].cases(6, 0)
+    cases = POSES["tangency"].cases(4, 0)
     answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=1.0)
-    assert answers.crashed == [2]
-    assert answers.timeouts == [4]
-    assert np.isfinite(answers.distance).sum() == 4
+    assert answers.crashed == [1]
+    assert answers.timeouts == [3]
+    assert np.isfinite(answers.distance).sum() == 2
     assert any("ended with SIGSEGV" in note for note in answers.notes)
 
 
