@@ -13,7 +13,7 @@ from hypothesis import settings
 from clamp3d import cli
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
-# Tests start Python hundreds of times: it would compile the package each time where it is told to keep nothing.
+# Tests start Python many times: without bytecode each process would compile the package again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 

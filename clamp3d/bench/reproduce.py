@@ -125,7 +125,7 @@ class Reproduction:
 
 
 def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reproduction:
-    """Compute everything; ``progress`` is told what comes next."""
+    """Compute everything; ``progress`` gets what comes next."""
     need("skimage", "Table 4 with its image detection")
     clamp = load_clamp("reference")
     table4: list[DistanceRow] = []

@@ -48,9 +48,9 @@ def command(
     """Write the parts of INPUT for CAD review, with a manifest beside them.
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the paths of the
-    files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification demands. STEP
-    holds true arcs, not facets. Exit code 1 if the clamp that is placed does not close as it should, and without a file
-    if a step of the sequence is blocked.
+    files. World axes are Z up, a clamp's wires along Y; GLB is metres and Y up, as its specification requires.
+    STEP holds true arcs, not facets. Exit code 1 if the clamp does not close on both wires; also 1, and no file, if a
+    step of the sequence is blocked.
     """
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly

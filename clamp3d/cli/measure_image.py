@@ -27,7 +27,7 @@ def command(
     reference: list[tuple[float, float]] = option(
         "The two ends of a measured length, in px.", type=two_points, required=True, metavar="'X,Y X,Y'"
     ),
-    scale: float = option("That length, by calliper.", required=True, metavar="MM"),
+    scale: float = option("The measured length.", required=True, metavar="MM"),
     kind: str = option(
         "Square to the reference line, or straight from point to point.",
         "--measure",
@@ -35,7 +35,7 @@ def command(
         default="height",
     ),
     snap: float | None = option("Move each mark to the strongest corner within PX pixels.", metavar="PX"),
-    marking_error: float | None = option("Of a mark, one sigma.  [default: 4.5; 0.5 snapped]", metavar="PX"),
+    marking_error: float | None = option("Standard deviation of a mark.  [default: 4.5; 0.5 snapped]", metavar="PX"),
     calliper_error: float = option("Standard deviation of a reading.", default=0.02, metavar="MM"),
     json_file: Path | None = JSON,
 ) -> None:

@@ -23,15 +23,17 @@ class Mechanics:
     """Torque (Nm), friction of thread and nut face, measured splint distance (mm), friction of the grooves."""
 
     torque: float | None = option(
-        "Also tell what this torque at the nut does: preload, force in each contact, when a wire slips.", metavar="NM"
+        "Also report the effect of this torque at the nut: preload, contact forces, when a wire slips.", metavar="NM"
     )
     friction: tuple[float, ...] | None = option(
         "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=numbers, metavar="MU,..."
     )
-    measured: float | None = option("Also tell whether friction explains this distance of the splints.", metavar="MM")
+    measured: float | None = option(
+        "Also report whether friction explains this measured splint distance.", metavar="MM"
+    )
     groove_friction: tuple[float, ...] | None = option(
-        "Friction of the wires in their grooves, with --torque and --measured; alone it tells between which distances "
-        "the clamp stays.  [default: 0.1,0.2]",
+        "Friction of the wires in their grooves, with --torque and --measured; alone: report the range of splint "
+        "distances at which the clamp stays.  [default: 0.1,0.2]",
         type=numbers,
         metavar="MU,...",
     )

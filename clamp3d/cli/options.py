@@ -199,7 +199,7 @@ class Source(ClampSource):
     poses: Path | None = option(
         "Poses of a folder of meshes: CSV with name,x,y,z,qx,qy,qz,qw.", type=INPUT_FILE, metavar="CSV"
     )
-    partial: bool = option("Go on where some bodies of a file cannot be read; a note says how many of how many.")
+    partial: bool = option("Continue if some bodies of a file cannot be read; a note says how many were read.")
 
     def load(self) -> Clamp | Scene:
         """A clamp, or a scene from a scene file or any file that holds bodies."""
@@ -241,7 +241,7 @@ class Method:
     sequence: str | None = SEQUENCE
     step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")
     tilt_step: float | None = option(
-        "Turn of the stepped solver.  [default: 1]", "--tilt-step-deg", type=radians, metavar="A"
+        "Tilt step of the stepped solver.  [default: 1]", "--tilt-step-deg", type=radians, metavar="A"
     )
 
     def refuse(self) -> None:
@@ -289,7 +289,7 @@ class Viewing:
     timeout: float | None = option("Stop serving after S seconds.", type=click.FloatRange(min=0.0), metavar="S")
     open_browser: bool = option("Open the page in a browser.", "--open")
     overlays: tuple[str, ...] = option(
-        "Also show what a baseline makes of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
+        "Also draw a baseline's approximation of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
         "in mm). May be given more than once.",
         "--overlay",
         multiple=True,

@@ -62,7 +62,7 @@ def command(
     plot_file: Path | None = option("Draw the matrix (.png, .svg, .pdf).", "--plot", type=PICTURE),
     quiet: bool = QUIET,
 ) -> None:
-    """Put families of hard contact cases with exact answers to every contact method, and count what goes wrong.
+    """Run every contact method on families of hard cases with known answers, and count its errors.
 
     Exit code 1 if the project's own method, cas, has a wrong verdict or an error beyond its bound.
     """

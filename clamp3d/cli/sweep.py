@@ -23,10 +23,10 @@ def command(
     json_file: Path | None = JSON,
     quiet: bool = QUIET,
 ) -> None:
-    """From where the open CLAMP catches a wire, and how far it may lean: the accuracy that a robot needs.
+    """Map the start places from which the open CLAMP seats a wire, and how far it may lean: the accuracy for a robot.
 
-    The clamp is closed from start places all over its opening, the wire free to give way: it ends seated in the arcs,
-    on a lip, or not clamped. Then the wire is held at its place, turned, while the splints close on it.
+    The clamp is closed with the wire at places all over its opening, free to move: it ends seated in the arcs, on a
+    lip, or not clamped. For the lean, the wire is held at its place and turned while the splints close on it.
     """
     from clamp3d.clamp.capture import Outcome
     from clamp3d.clamp.placement import placement

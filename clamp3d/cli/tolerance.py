@@ -24,8 +24,8 @@ def command(
     source: ClampSource = CLAMP,
     n: int = option("Clamps to assemble.", type=click.IntRange(1, 100_000_000), default=1000),
     seed: int = option("Seed of the dimensions.", type=click.IntRange(0), default=0),
-    tolerance: float | None = option("Either way, each dimension.  [default: ISO 2768-1 m]", metavar="MM"),
-    wire_tolerance_percent: float = option("Of the diameters.", default=1.0, metavar="P"),
+    tolerance: float | None = option("Plus or minus, for each dimension.  [default: ISO 2768-1 m]", metavar="MM"),
+    wire_tolerance_percent: float = option("Plus or minus, for the wire diameters.", default=1.0, metavar="P"),
     distribution: str = option(
         "Within the tolerance, or with 3 sigma = tolerance.",
         type=click.Choice(("uniform", "normal")),

@@ -16,7 +16,7 @@ def command(
     viewing: Viewing = VIEWING,
     quiet: bool = option("No progress; the page's address is printed all the same.", "--quiet", "-q"),
 ) -> None:
-    """Show INPUT in a browser: a clamp is assembled before your eyes, a scene is checked and its motions played.
+    """Show INPUT in a browser: the assembly of a clamp as an animation, or a scene with its findings and motions.
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the page's address
     and serves it until Ctrl-C (or --timeout). With --html the page is written to a file instead; with --url the scene

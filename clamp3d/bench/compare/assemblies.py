@@ -16,7 +16,7 @@ from clamp3d.clamp.result import Solver
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """The reference clamp assembled by a method: Table 4's ``distance`` in mm, CPU seconds, what was asked and tried.
+    """The reference clamp assembled by a method: Table 4's ``distance`` in mm, CPU seconds, numbers of queries.
 
     ``setup`` is the time to make the model's pieces, ``seconds`` that of one assembly without it.
     """

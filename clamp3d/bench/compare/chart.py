@@ -1,7 +1,7 @@
 """The chart of a comparison: error against time per query, and beside it against set-up time; every method labelled.
 
-Colours are Okabe and Ito's, told apart by colour-blind readers; each method also has a marker of its own and its name
-beside its curve, so the chart reads in grey.
+Colours are Okabe and Ito's, which colour-blind readers can distinguish; each method also has a marker of its own and
+its name beside its curve, so the chart reads in grey.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _LOOKS: dict[str, _Look] = {
     "coal-cylinder": _Look("#000000", "P", "coal, cylinder", -1, (4.0, 12.0), "left"),
     "coal-capsule": _Look("#000000", "P", "coal, capsule", -1, (-20.0, 14.0), "right"),
     "coal-axis": _Look("#000000", "P", "coal, axis", 0, (-6.0, -12.0), "right"),
-    "coal-sector": _Look("#000000", "P", "coal, asked for one\nsector by hand", 0, (-12.0, -16.0), "right", True),
+    "coal-sector": _Look("#000000", "P", "coal, one sector\nchosen by hand", 0, (-12.0, -16.0), "right", True),
     "mujoco-cylinder": _Look("#8A6D00", "X"),
     "mujoco-capsule": _Look("#8A6D00", "X", "MuJoCo, capsule", -1, (-24.0, 28.0), "right"),
     "mujoco-sector": _Look("#8A6D00", "X", "MuJoCo, one sector", 0, (-12.0, -36.0), "right", True),

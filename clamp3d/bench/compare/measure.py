@@ -13,7 +13,7 @@ from clamp3d.bench.compare.scene import BANDS, CLEAR, OVERLAP, Poses, known_pose
 from clamp3d.geometry.pose import Array
 
 _PASSES = 3
-"""Times that everything is asked at least."""
+"""Least number of passes over the poses."""
 _PART = 1e-3
 """Seconds of a stretch that is timed by itself: now and then one runs undisturbed also where a core is shared."""
 _BATCH = 0.05

@@ -117,7 +117,7 @@ def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -
     if method.family == "hulls":
         settings |= {"threshold": method.setting, "mesh_error": 0.01}
     model = contact_model(method.family, parts(clamp), **settings, time_limit=time_limit, progress=False)
-    for groove in groove_pairs(clamp).values():  # models make their pieces when they are first asked
+    for groove in groove_pairs(clamp).values():  # models make their pieces on first use
         model.pieces(groove, groove.T_a_groove @ inverse(groove.T_b_cylinder))
     return model
 
@@ -170,7 +170,7 @@ ANGLES_DEG = (1.0, 5.0, 20.0)
 SECTOR_ANGLES_DEG = (0.1, 1.0, 5.0)
 """Of pieces that are looked up: their number costs nothing."""
 AXIS_ANGLES_DEG = (0.01, 0.1, *ANGLES_DEG)
-"""Of a surface that is asked for an axis: the number of its triangles costs little."""
+"""Piece angles (deg) of a surface that is measured against an axis: the number of its triangles costs little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ class Series:
 
 
 def ready(one: Callable[[Array], float], pieces: int, *, depth: bool, keep: object = None) -> Prepared:
-    """A method that is asked pose by pose; asked once here, for what it makes when it is first used."""
+    """A method that is called pose by pose; called once here, for what it makes on first use."""
 
     def many(poses: Array) -> Array:
         return np.array([one(T) for T in poses])

@@ -46,7 +46,7 @@ class NotMeasured:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All answers; ``peers`` is empty unless asked for. ``seconds`` is the whole time on the clock."""
+    """All answers; ``peers`` is empty by default. ``seconds`` is the whole time on the clock."""
 
     machine: Machine
     contact: tuple[Measured | NotMeasured, ...]
@@ -64,7 +64,7 @@ class Comparison:
 def compare(
     *, peers: bool = False, progress: Callable[[int, int, str], None] = lambda done, total, what: None
 ) -> Comparison:
-    """Measure all methods, one process after the other; ``progress`` is told jobs done, jobs in all and what is next.
+    """Measure all methods, one process after the other; ``progress`` gets jobs done, jobs in all and the next one.
 
     Times on the poses are the least of `ROUNDS` processes each; in all some minutes. A method that fails or does not
     end in time becomes a row that says so.

@@ -24,7 +24,7 @@ def generator(family: str, seed: int) -> np.random.Generator:
 class Family(ABC):
     """A kind of difficulty. ``about`` says in one line what is hard; ``make(rng, n)`` builds n cases.
 
-    ``part`` is the part of the cases asked for that it has, ``truth_error`` the largest error of a truth in parts of
+    ``part`` is the share of the requested cases that it has, ``truth_error`` the largest error of a truth in parts of
     the scene.
     """
 

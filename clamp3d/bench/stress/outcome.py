@@ -136,7 +136,7 @@ def score(
         family=family,
         method=method,
         cases=len(error),
-        asked=int(answers.asked.sum()),
+        asked=int(answers.tried.sum()),
         answered=int(np.isfinite(answers.distance).sum()),
         refused=int(answers.refused.sum()),
         false_hits=int(wrong.false_hit.sum()),
@@ -171,7 +171,7 @@ def judge(
     """
     have = np.isfinite(answers.distance)
     # An answer that is not a number is no answer and no refusal.
-    answers.failed |= answers.asked & ~have & ~answers.refused
+    answers.failed |= answers.tried & ~have & ~answers.refused
     answers.failed[answers.crashed + answers.timeouts] = False
     error = np.abs(np.asarray(answers.distance - exact, np.float64))
     if band is None:

@@ -91,7 +91,7 @@ def run_stress(
     """Put ``families`` (all by default, see `expand`) to ``methods`` (all by default), n cases each.
 
     ``check`` truths per family are worked out again at 50 digits; ``time_limit`` seconds are given to each other
-    method per family; ``workers`` processes share the families. ``progress`` is told the family that is done, how many
+    method per family; ``workers`` processes share the families. ``progress`` gets the family that is done, how many
     are, and of how many. The result does not depend on ``workers``, up to times.
     Raises InputError for unknown names and numbers that are not positive.
     """

@@ -1,4 +1,4 @@
-"""A method put to a family, shape by shape; in a process of its own where the method's libraries may end it."""
+"""Runs a method on a family, shape by shape; in a process of its own if the method's libraries may crash."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from clamp3d.errors import Clamp3dError, without_numbers
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.geometry.pose import Array
 
-_MAX_DEATHS = 5
+_MAX_CRASHES = 5
 _START_LIMIT = 120.0  # s
 Measures = Literal["depth", "clearance", "verdict"]
 """What a method's answers are good for: signed distances, distances while apart, or their sign alone."""
@@ -70,17 +70,17 @@ class Method(Protocol):
 
 @dataclass
 class Answers:
-    """What came back: ``distance`` and ``bound`` (n,) NaN where nothing did; ``refused``: said why; ``failed``: raised.
+    """Answers to n cases: ``distance`` and ``bound`` (n,), NaN where there is none; ``refused``, ``failed``: which.
 
     ``crashed`` lists the cases that ended the interpreter, ``timeouts`` those that it did not answer in time, ``notes``
-    one message per kind of failure. Cases that are not ``asked`` were skipped when the time was over.
+    one message per kind of failure. Cases that are not ``tried`` were skipped when the time was over.
     """
 
     distance: Array
     bound: Array
     refused: NDArray[np.bool_]
     failed: NDArray[np.bool_]
-    asked: NDArray[np.bool_]
+    tried: NDArray[np.bool_]
     seconds: float = 0.0
     crashed: list[int] = field(default_factory=list)
     timeouts: list[int] = field(default_factory=list)
@@ -99,11 +99,11 @@ class Answers:
 
 
 _Reply = tuple[NDArray[np.intp], Measured | None, str, float]
-"""Rows, what the method said to them, or why it said nothing, and the seconds that it took."""
+"""Rows, the method's answers, or why there is no answer, and the seconds."""
 
 
 def _measure(method: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
-    """Ask for some rows of one shape; a refusal in the package's own words begins with 'refused: '."""
+    """Measure some rows of one shape; the reason of an InputError begins with 'refused: '."""
     measured, why = None, ""
     start = time.perf_counter()
     try:
@@ -117,7 +117,7 @@ def _measure(method: Method, cases: Any, rows: NDArray[np.intp]) -> _Reply:
 
 
 def _replies(method: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]:
-    """Ask for all rows at once, and one by one if that gives no answer."""
+    """Measure all rows at once, and one by one if that gives no answer."""
     reply = _measure(method, cases, rows)
     if reply[1] is not None or len(rows) == 1:
         return [reply]
@@ -126,7 +126,7 @@ def _replies(method: Method, cases: Any, rows: NDArray[np.intp]) -> list[_Reply]
 
 def _record(answers: Answers, reply: _Reply) -> None:
     rows, measured, why, seconds = reply
-    answers.asked[rows] = True
+    answers.tried[rows] = True
     answers.seconds += seconds
     if measured is None:
         (answers.refused if why.startswith("refused: ") else answers.failed)[rows] = True
@@ -147,7 +147,7 @@ def _groups(cases: Any) -> list[NDArray[np.intp]]:
 
 
 def run_here(method: Method, cases: Any, time_limit: float | None = None) -> Answers:
-    """Put ``cases`` to a method in this process; groups of one shape at a time, singly where a group has no answer."""
+    """Run a method on ``cases`` in this process; groups of one shape at a time, singly where a group has no answer."""
     answers = Answers.empty(len(cases))
     groups = _groups(cases)
     if groups:
@@ -163,11 +163,11 @@ def run_here(method: Method, cases: Any, time_limit: float | None = None) -> Ans
 
 _PREPARE, _ANSWER = (f"{__name__}:{name}" for name in ("prepare", "answer"))
 _held: dict[str, tuple[Method, Any]] = {}
-"""In a child: the method that it is there for, and the cases."""
+"""In a child: its method and cases."""
 
 
 def prepare(setup: bytes) -> None:
-    """Child: make the method, let it import what it needs by a first question, and keep the cases."""
+    """Child: make the method, let it import what it needs by a first call, and keep the cases."""
     make, cases = pickle.loads(setup)
     _held["here"] = make(), cases
 
@@ -178,17 +178,17 @@ def answer(rows: NDArray[np.intp]) -> list[_Reply]:
 
 
 def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, case_limit: float = 20.0) -> Answers:
-    """Put ``cases`` to the method that ``make`` (which must pickle) returns, in a child process that may die.
+    """Run the method that ``make`` (which must pickle) returns on ``cases``, in a child process that may crash.
 
-    A group on which the child dies or is silent for ``case_limit`` seconds is asked again case by case; after some
-    deaths the rest of the family is skipped. ``time_limit`` seconds are for the whole family.
+    A group on which the child crashes or is silent for ``case_limit`` seconds is tried again case by case; after some
+    crashes the rest of the family is skipped. ``time_limit`` seconds are for the whole family.
     """
     answers = Answers.empty(len(cases))
     queue: list[NDArray[np.intp]] = _groups(cases)[::-1]
     end = time.monotonic() + time_limit
-    setup, is_ready, deaths = pickle.dumps((make, cases)), False, 0
+    setup, is_ready, crashes = pickle.dumps((make, cases)), False, 0
     with Worker() as worker:
-        while queue and time.monotonic() < end and deaths < _MAX_DEATHS:
+        while queue and time.monotonic() < end and crashes < _MAX_CRASHES:
             try:
                 if not is_ready:
                     worker.call(_PREPARE, setup, time_limit=_START_LIMIT)
@@ -209,8 +209,8 @@ def run_isolated(make: Callable[[], Method], cases: Any, *, time_limit: float, c
             if len(rows) > 1:
                 queue += [np.array([row]) for row in rows[::-1]]
             else:
-                deaths += 1
-                answers.asked[rows] = True
+                crashes += 1
+                answers.tried[rows] = True
                 lost.append(int(rows[0]))
                 answers.note(why)
     return answers

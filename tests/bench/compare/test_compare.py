@@ -161,10 +161,10 @@ def test_a_picture_as_page_and_as_image(tmp_path: Path) -> None:
 
 
 def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[str, str]] = []
+    jobs: list[tuple[str, str]] = []
 
     def answer(kind: str, method: Method, *, time_limit: float) -> Any:
-        asked.append((kind, method.family))
+        jobs.append((kind, method.family))
         if kind == "contact" and method.family == "hulls":
             raise JobError("crashed (SIGABRT)")
         if kind in ("contact", "peer"):
@@ -180,13 +180,13 @@ def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.
     assert [row.label for row in found.contact] == [m.label for m in METHODS]
     assert {r.reason for r in found.contact if isinstance(r, NotMeasured)} == {"crashed (SIGABRT)"}
     assert {r.method for r in found.peers if isinstance(r, NotMeasured)} == {"coal-sector"}
-    assert not any(method == "coal-sector" for _, method in asked)
+    assert not any(method == "coal-sector" for _, method in jobs)
     assert steps[-1][0] == steps[-1][1]
     assert steps == sorted(steps)
     assert len(found.assemblies) == len(study.ASSEMBLIES)
-    asked.clear()
+    jobs.clear()
     compare()
-    assert not any(kind == "peer" for kind, _ in asked)
+    assert not any(kind == "peer" for kind, _ in jobs)
 
 
 def test_the_command_shows_every_row_and_why_one_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ CLAMPS = 2
 
 
 @pytest.mark.parametrize("family", ASSEMBLIES)
-def test_every_answer_is_a_place_of_rest_and_every_firm_one_is_named(family):
+def test_every_answer_is_an_equilibrium_and_every_firm_one_is_named(family):
     (outcome,), _ = run_family(family, ["cas"], 100 * CLAMPS, 20, 60.0, 0)
     assert (outcome.asked, outcome.answered, outcome.refused, outcome.exceptions) == (CLAMPS, CLAMPS, 0, 0)
     assert (outcome.false_hits, outcome.false_misses, outcome.beyond_bound) == (0, 0, 0), outcome.examples

@@ -88,7 +88,7 @@ def _broken(fault):
 
 
 @pytest.mark.parametrize("fault", ["none", "steps over thin parts", "misses", "late"])
-def test_a_wrong_min_clearance_or_first_contact_is_found_out(fault, monkeypatch):
+def test_a_wrong_min_clearance_or_first_contact_is_seen(fault, monkeypatch):
     for name, function in zip(("min_clearance", "first_contact"), _broken(fault), strict=True):
         monkeypatch.setattr(motions, name, function)
     (outcome,), _ = run_family("motion: thin and fast", ["cas"], 20, 3, 60.0, 0)

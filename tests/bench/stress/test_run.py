@@ -96,12 +96,12 @@ def test_same_seed_same_cases_and_same_result_on_two_processes():
     assert not np.array_equal(POSES["tangency"].cases(100, 5).T_groove_wire, other.T_groove_wire)
 
 
-def test_a_wrong_method_is_found_out():
+def test_a_wrong_method_is_seen():
     """The judge on answers that are off by known amounts."""
     cases = POSES["tangency"].cases(200, 1)
     exact = truth(cases)
     answers = Answers.empty(200)
-    answers.asked[:] = True
+    answers.tried[:] = True
     answers.distance[:] = np.asarray(exact, float)
     answers.bound[:] = 1e-3
     near = np.abs(np.asarray(exact, float)) > 1e-2

@@ -1,4 +1,4 @@
-"""manifold3d 3.5: `Manifold.min_gap` of the closed block and the wire's axis, asked up to 2 mm beyond the wire.
+"""manifold3d 3.5: `Manifold.min_gap` of the closed block and the wire's axis, searched up to 2 mm beyond the wire.
 
 Every pair of triangles that is not farther is looked at, so the wire is the body with the fewest: a tetrahedron about
 its axis, thinner than any error here. On one core, as it is at its best: on meshes of this size its other threads only

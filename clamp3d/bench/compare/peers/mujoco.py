@@ -1,4 +1,4 @@
-"""MuJoCo 4: box geoms of one body, convex as it advises for other shapes; in metres, no farther than 2 mm asked.
+"""MuJoCo 4: box geoms of one body, convex as it advises for other shapes; in metres, searched up to 2 mm.
 
 Whole part: a distance sensor between two bodies (native convex collision), its wire placed where kinematics would put
 it; many poses at once by `mujoco.rollout`, which runs in C++. A sector:
@@ -28,7 +28,7 @@ def _model(unit_angle: float, shape: str) -> tuple[Any, int]:
     def numbers(x: Array) -> str:
         return " ".join(repr(float(v)) for v in x.ravel())
 
-    passive = 'contype="0" conaffinity="0"'  # asked by the sensor alone, not by a simulation's collision detection
+    passive = 'contype="0" conaffinity="0"'  # for the sensor alone, not for a simulation's collision detection
     pieces = boxes(unit_angle)
     geoms = [
         f'<geom type="box" size="{numbers(0.5 * _MM * size)}" pos="{numbers(_MM * T[:3, 3])}" '

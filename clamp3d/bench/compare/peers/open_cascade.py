@@ -1,10 +1,10 @@
 """Open CASCADE 8: `BRepExtrema_DistShapeShape` on the true B-rep, nothing faceted; the block is loaded once.
 
-Of the block it is given the faces that the wire can come near, as the others are: a solid has more of them, and is
-asked first whether it holds a corner of the other. Neither `Extrema_ExtFlag_MIN` nor `Extrema_ExtAlgo_Tree` is quicker.
-The cylinder has no depth. ``axis`` asks the wire's axis, less the radius: exact apart and in an overlap as long as the
-axis is outside the material. ``face`` knows that the groove's face decides, and that the axis is nearest to it at one
-of its ends: it asks `GeomAPI_ExtremaCurveCurve` for their two arcs, without topology.
+The block consists of the faces that the wire can come near, as for the other libraries: a solid has more faces, and is
+first tested for corners of the other shape inside it. Neither `Extrema_ExtFlag_MIN` nor `Extrema_ExtAlgo_Tree` is
+quicker. The cylinder has no depth. ``axis`` measures the wire's axis, less the radius: exact apart, and in an overlap
+as long as the axis is outside the material. ``face`` uses that the groove's face decides, and that the axis is nearest
+to it at one of its ends: `GeomAPI_ExtremaCurveCurve` measures their two arcs, without topology.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.step import location, solid
 
 
-def asked(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
+def distance_less(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
     """The distance of a shape at any pose from another one, less ``radius`` mm."""
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
@@ -82,7 +82,7 @@ def _arcs(_: float) -> Prepared:
     line, half = Geom_Line(gp_Pnt(0.0, 0.0, 0.0), ahead), 0.5 * WIRE.length
     limits = -half, half, 1.5 * math.pi - GROOVE.half_angle, 1.5 * math.pi + GROOVE.half_angle
 
-    def lowest(circle: Any) -> float:  # anew each time: after ``Init`` it would tell the last one's
+    def lowest(circle: Any) -> float:  # a new object each time: after ``Init`` it returns the last answer
         return float(GeomAPI_ExtremaCurveCurve(line, circle, *limits).TotalLowerDistance())
 
     def one(T: Array) -> float:
@@ -112,8 +112,10 @@ def _series(make: Callable[[float], Prepared]) -> Series:
 
 SERIES = {
     "open-cascade": _series(
-        lambda _: asked(_near(), together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False)
+        lambda _: distance_less(
+            _near(), together(explore(cylinder(WIRE.radius, WIRE.length), "FACE")), 0.0, depth=False
+        )
     ),
-    "open-cascade-axis": _series(lambda _: asked(_near(), axis(WIRE.length), WIRE.radius, depth=True)),
+    "open-cascade-axis": _series(lambda _: distance_less(_near(), axis(WIRE.length), WIRE.radius, depth=True)),
     "open-cascade-face": _series(_arcs),
 }

@@ -38,7 +38,7 @@ MAKERS = Makers("assembly: ")
 
 
 def _fitting(make: Callable[[np.random.Generator], Clamp | Case | None]) -> Callable[[np.random.Generator], Case]:
-    """The generator, asked again where it gives None: grooves that do not fit into the splints."""
+    """The generator, called again where it returns None: grooves that do not fit into the splints."""
 
     def case(rng: np.random.Generator) -> Case:
         drawn = None

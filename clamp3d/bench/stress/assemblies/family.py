@@ -35,7 +35,7 @@ EXACT = 1e-8
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What a solver says of a clamp: the state ``q`` that it comes to, and all states that it can come to, if told."""
+    """A solver's answer for a clamp: the final state ``q``, and all final states where it reports them."""
 
     q: Array
     others: tuple[Array, ...] | None
@@ -138,7 +138,7 @@ class AssemblyFamily(Family):
         return run_here(solver, cases, None if name == REFERENCE else time_limit)
 
     def judge(self, name: str, cases: Assemblies, truths: Truths, answers: Answers) -> Outcome:
-        """See the module; ``answers`` are those of the solver that was asked last."""
+        """See the module; ``answers`` are those of the last solver."""
         n = len(cases)
         d, error, missed, near = (np.full(n, np.nan) for _ in range(4))
         for i, rest in truths.rests.items():
@@ -162,7 +162,7 @@ class AssemblyFamily(Family):
 
 
 class Truths(dict[int, tuple[Envelope, list[Minimum]]]):
-    """Envelope and equilibria of each case, worked out when first asked for; ``rests`` are the answers to judge."""
+    """Envelope and equilibria of each case, computed on first use; ``rests`` are the answers to judge."""
 
     def __init__(self, cases: Assemblies) -> None:
         super().__init__()
