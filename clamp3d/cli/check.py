@@ -18,6 +18,7 @@ from clamp3d.cli.options import (
     complete_inputs,
     declared,
     group,
+    number,
     option,
 )
 from clamp3d.cli.progress import bar
@@ -26,6 +27,7 @@ from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
+    from clamp3d.engine.allowed import Allowed
 
 BCF = Output((".bcfzip", ".bcf"))
 
@@ -39,6 +41,16 @@ def name_pairs(text: str) -> list[tuple[str, str]]:
             raise click.BadParameter(f"must read like P1:P6,P2:P7, got {item!r}")
         pairs.append((a, b))
     return pairs
+
+
+def allowed_rule(text: str) -> Allowed:
+    """A rule about contacts that are meant, as the type of an option."""
+    from clamp3d.engine.allowed import Allowed
+
+    rule, _, depth = text.partition("=")
+    a, colon, b = rule.partition(":")
+    overlap = number(depth) if depth else 0.0
+    return Allowed(a, b, overlap) if colon else Allowed(overlap=overlap, relation=rule)
 
 
 @dataclass(frozen=True)
@@ -56,6 +68,13 @@ def command(
     source: Source = group(Source, source=argument(metavar="INPUT", required=True, shell_complete=complete_inputs)),
     pairs: list[tuple[str, str]] | None = option(
         "Only these pairs, for instance P1:P6,P2:P7.", type=name_pairs, metavar="A:B,..."
+    ),
+    allow: tuple[Allowed, ...] = option(
+        "Contact that is meant: in a kind of fit (running, press, thread, duplicate), or of parts by name or pattern, "
+        "and up to which overlap. May be repeated.",
+        multiple=True,
+        type=allowed_rule,
+        metavar="FIT|A:B[=MM]",
     ),
     clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM"),
     distances: bool = option("Measure every pair, not only as finely as its verdict needs."),
@@ -90,8 +109,8 @@ def command(
 
         run = assemble(loaded)
         scene = run.scene
-    if clearance is not None:
-        scene = replace(scene, clearance=clearance)
+    clearance = scene.clearance if clearance is None else clearance
+    scene = replace(scene, clearance=clearance, allowed=(*scene.allowed, *allow))
     accepted = read_accepted(accepted_file(source.source))
     compare(scene, (), baseline, accepted)  # a file that cannot be read is reported before the work
     with bar(quiet) as report:

@@ -30,7 +30,8 @@ def judge(
     Of an overlap the distance bounds minus the interference, or minus the depth where two convex pieces tell it.
     """
     if is_duplicate(a, b, T, thresholds.contact):
-        return Verdict.DUPLICATE, replace(start, lower=-np.inf, upper=-0.0, level="boxes", method="equal shapes")
+        verdict = Verdict.ALLOWED if allowance == np.inf else Verdict.DUPLICATE
+        return verdict, replace(start, lower=-np.inf, upper=-0.0, level="boxes", method="equal shapes")
 
     def certain(distance: Distance) -> bool:
         return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN

@@ -138,7 +138,7 @@ class Scene:
 
     @cached_property
     def _allowances(self) -> Allowances:
-        return Allowances.of(self.allowed)
+        return Allowances.of(self.allowed, self.parts)
 
     def _with(self, **values: object) -> Scene:
         """The scene with other values in fields, which are known to fit: nothing is checked again."""
@@ -210,6 +210,11 @@ class Scene:
         if text("part", name) not in self._index:
             raise InputError(unknown_part(name, self._index))
         return self._index[name]
+
+    def pairs_by_rule(self, pairs: Iterable[tuple[str, str]]) -> dict[Allowed, int]:
+        """How many of these pairs each rule that speaks of more than one allows."""
+        rules, listed = self._allowances, list(pairs)
+        return {rule: sum(rules.overlap_by(rule, *pair) is not None for pair in listed) for rule in rules.rules}
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""

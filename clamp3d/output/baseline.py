@@ -20,6 +20,7 @@ from clamp3d.output.tables import csv_table
 
 Status = Literal["new", "changed", "same", "accepted"]
 Names = tuple[str, str]
+Key = tuple[str, str, str | None, bool]
 
 COLUMNS = ("id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method")
 _CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
@@ -35,11 +36,11 @@ class Comparison:
     Attributes
     ----------
     status : mapping
-        Of each group by its identifier.
+        Of each group by its identifier: "new" where a pair of it is, "changed" where one stands otherwise now.
     changed : mapping
-        The pairs of a group that were not in it before, or stand otherwise to each other now.
+        The new and changed pairs of each group.
     gone : tuple of dict
-        The earlier groups that are no more, as the JSON has them.
+        The earlier groups, as the JSON has them, with the pairs that are no finding any more.
     moved : mapping
         The parts that moved against most others, with how far in mm; infinite where a part is new.
     has_baseline : bool
@@ -62,35 +63,46 @@ def compare(
 ) -> Comparison:
     """Compare groups with those of a result that ``check --json`` wrote. Raises InputError if it holds none.
 
-    A group counts as new too where it was no clash in the earlier check and is one now.
+    A pair is new too where it was no clash in the earlier check and is one now, whatever group it was in.
     """
     if baseline is None:
         return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {})
     before = Baseline.read(baseline)
+    earlier = {key for _, keys in before.groups for key in keys}
     status: dict[str, Status] = {}
     changed: dict[str, tuple[Names, ...]] = {}
+    now = set[Key]()
     for group in groups:
-        old = before.groups.get(group.id)
-        pairs = () if old is None else tuple((r.a, r.b) for r in group.rows if before.differs(scene, old, r))
+        pairs = [(row.a, row.b) for row in group.rows]
+        keys = _keys(pairs, group.motion, group.verdict)
+        now.update(keys)
+        new = {pair for pair, key in zip(pairs, keys, strict=True) if key not in earlier}
+        different = {(row.a, row.b) for row in group.rows if before.differs(scene, row)} - new
+        is_new = len(new) == len(pairs) or (new and group.verdict in BAD)
+        status[group.id] = "new" if is_new else "changed" if new or different else "same"
         if group.id in accepted:
             status[group.id] = "accepted"
-        elif old is None or (group.verdict in BAD and old.get("verdict") not in BAD):
-            status[group.id] = "new"
-        else:
-            alike = (old.get("verdict"), old.get("count")) == (group.verdict.value, len(group.rows))
-            status[group.id] = "same" if alike and not pairs else "changed"
-        if pairs:
-            changed[group.id] = pairs
-    gone = tuple(old for identifier, old in before.groups.items() if identifier not in status)
-    return Comparison(status, changed, gone, before.moved(scene), True)
+        if new or different:
+            changed[group.id] = tuple(pair for pair in pairs if pair in new | different)
+    gone = []
+    for old, keys in before.groups:
+        lost = [pair for pair, key in zip(old["pairs"], keys, strict=True) if key not in now]
+        if lost:
+            gone.append({**old, "pairs": lost, "count": len(lost)})
+    return Comparison(status, changed, tuple(gone), before.moved(scene), True)
+
+
+def _keys(pairs: Iterable[Sequence[str]], motion: str | None, verdict: str) -> list[Key]:
+    """What is one finding in two checks: the names of a pair, the motion, and whether it is a clash."""
+    return [(*sorted(pair), motion, verdict in BAD) for pair in pairs]  # type: ignore[misc]
 
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """An earlier check: its groups by their identifiers, the bounds of its rows, and where its parts stood."""
+    """An earlier check: its groups, verdict and bounds of its rows, and where its parts stood."""
 
-    groups: Mapping[str, Mapping[str, Any]]
-    bounds: Mapping[tuple[str | None, ...], tuple[float | None, float | None]]
+    groups: Sequence[tuple[Mapping[str, Any], list[Key]]]
+    rows: Mapping[tuple[str | None, ...], tuple[str, float | None, float | None]]
     poses: Mapping[str, Array]
 
     @classmethod
@@ -98,9 +110,13 @@ class Baseline:
         """From the JSON of a check. Raises InputError for a file that is none."""
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            groups = {group["id"]: group for group in data["groups"]}
-            bounds = {
-                (*sorted((row["a"], row["b"])), row.get("motion")): (row["at_least_mm"], row["at_most_mm"])
+            groups = [(old, _keys(old["pairs"], old["motion"], old["verdict"])) for old in data["groups"]]
+            rows = {
+                (*sorted((row["a"], row["b"])), row.get("motion")): (
+                    row["verdict"],
+                    row["at_least_mm"],
+                    row["at_most_mm"],
+                )
                 for row in (*data["pairs"], *data["motions"])
             }
             poses = {name: np.array(part["T_world"], dtype=np.float64) for name, part in data["parts"].items()}
@@ -108,20 +124,16 @@ class Baseline:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
         except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
-        return cls(groups, bounds, poses)
+        return cls(groups, rows, poses)
 
-    def differs(self, scene: Scene, group: Mapping[str, Any], row: PairResult) -> bool:
-        """Whether a pair is new in its group, or its distance or its parts' places to each other have changed."""
-        names = sorted((row.a, row.b))
-        if names not in [sorted(pair) for pair in group.get("pairs", [])]:
-            return True
-        least, most = self.bounds.get((*names, row.motion), (None, None))
+    def differs(self, scene: Scene, row: PairResult) -> bool:
+        """Whether the verdict of a pair, its distance or its parts' places to each other have changed."""
+        verdict, least, most = self.rows.get((*sorted((row.a, row.b)), row.motion), ("", None, None))
         slack = max(_CHANGED, _CHANGED_SHARE * abs(row.distance.upper))
-        if (most is not None and row.distance.lower > most + slack) or (
-            least is not None and row.distance.upper < least - slack
-        ):
-            return True
-        if row.a not in self.poses or row.b not in self.poses:
+        lower, upper = row.distance.lower, row.distance.upper
+        farther = most is not None and lower > most + slack
+        deeper = least is not None and upper < least - slack
+        if verdict != row.verdict or farther or deeper or row.a not in self.poses or row.b not in self.poses:
             return True
         now = inverse(_pose(scene, row.a)) @ _pose(scene, row.b)
         return not _same(now, inverse(self.poses[row.a]) @ self.poses[row.b])

@@ -13,17 +13,21 @@ import math
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
 from clamp3d.errors import InputError
-from clamp3d.geometry.shapes import Shape
+from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.pose import inverse
+from clamp3d.geometry.shapes import Shape, Solid
 from clamp3d.output.files import write_text
 
 _JUMP, _JUMP_SHARE = 0.01, 0.2
@@ -37,7 +41,8 @@ class Group:
     Attributes
     ----------
     id : str
-        Identifier from the names and the motion: the same when the file is read again, in whatever order.
+        Identifier from the verdict, the motion, and the names, sizes and relative poses of the parts: the same when
+        the file is read again, in whatever order. A finding that was accepted is open again when its parts moved.
     a, b : str
         The two families, or the names of the two parts.
     rows : tuple of PairResult
@@ -104,7 +109,7 @@ def grouped(result: CheckResult) -> tuple[Group, ...]:
         if row.motion is None or frozenset((row.a, row.b)) not in clashing:
             key = (row.motion or "", *sorted((family[row.a], family[row.b])))
             causes.setdefault(key, []).append(row)
-    groups = [group for key, rows in causes.items() for group in _identified(key, _alike(rows), family)]
+    groups = [_group(result.scene, rows, family) for cause in causes.values() for rows in _alike(cause)]
     order = {verdict: k for k, verdict in enumerate(Verdict)}
     order |= dict.fromkeys(BAD, 0)
     return tuple(sorted(groups, key=lambda group: (order[group.verdict], len(group.rows), group.upper)))
@@ -127,17 +132,24 @@ def _jumps(last: float, next_at_least: float) -> bool:
     return next_at_least > last + max(_JUMP, _JUMP_SHARE * abs(last))
 
 
-def _identified(key: tuple[str, ...], clusters: list[list[PairResult]], family: Mapping[str, str]) -> Iterable[Group]:
-    """The groups of one cause: the largest is named by the families, those that differ from it by their parts."""
-    names = [sorted(f"{row.a}:{row.b}" for row in cluster) for cluster in clusters]
-    first = min(range(len(clusters)), key=lambda k: (-len(clusters[k]), names[k]))
-    for k, cluster in enumerate(clusters):
-        row, rows = cluster[0], tuple(cluster)
-        a, b = (family[row.a], family[row.b]) if len(rows) > 1 else (row.a, row.b)
-        text = "\n".join(key if k == first else (*key, *names[k]))
-        identifier = hashlib.blake2s(text.encode(), digest_size=4).hexdigest()
-        lower, upper = min(row.distance.lower for row in rows), max(row.distance.upper for row in rows)
-        yield Group(identifier, a, b, rows, lower, upper)
+def _group(scene: Scene, rows: Sequence[PairResult], family: Mapping[str, str]) -> Group:
+    row = rows[0]
+    a, b = (family[row.a], family[row.b]) if len(rows) > 1 else (row.a, row.b)
+    identifier = hashlib.blake2s("\n".join(sorted(_signature(scene, row) for row in rows)).encode(), digest_size=4)
+    lower, upper = min(row.distance.lower for row in rows), max(row.distance.upper for row in rows)
+    return Group(identifier.hexdigest(), a, b, tuple(rows), lower, upper)
+
+
+def _signature(scene: Scene, row: PairResult) -> str:
+    """Verdict, motion, names, sizes and relative pose of two parts, in whatever order the file has them."""
+    a, b = (scene.parts[scene.index(name)] for name in sorted((row.a, row.b)))
+    corners = [
+        part.shape.bounds if isinstance(part.shape, (Solid, BrepSolid)) else part.shape.mesh.vertices for part in (a, b)
+    ]
+    sizes = [np.ptp(points, axis=0) for points in corners]
+    # Steps of 1e-3 mm; what a file says with a few decimals lies on no border between two.
+    place = np.floor(1e3 * np.concatenate([*sizes, (inverse(a.T_world) @ b.T_world)[:3].ravel()]) + 0.37)
+    return " ".join([row.verdict.value, row.motion or "", a.name, b.name, *map(str, place.astype(int))])
 
 
 def families(scene: Scene) -> dict[str, str]:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from clamp3d import __version__
+from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.result import CheckResult, Work
 from clamp3d.engine.verdict import Verdict
 from clamp3d.output.baseline import Comparison
@@ -39,6 +40,7 @@ def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> 
     if comparison is not None and comparison.has_baseline:
         data["gone"] = list(comparison.gone)
         data["moved_mm"] = {name: mm if math.isfinite(mm) else None for name, mm in (comparison.moved or {}).items()}
+    data["rules"] = [{"rule": str(rule), "pairs": count} for rule, count in _rules(result).items()]
     return data | result.to_dict() | {"work": asdict(result.work)}
 
 
@@ -48,6 +50,8 @@ def check_to_text(
     """The result as lines for a terminal: the headline, the groups of findings, the pairs, the motions."""
     lines = [f"{result.scene.name}: {headline(result)}", _counts(result)]
     lines += _cut([f"  note: {note}" for note in result.scene.notes], _NOTES, "more notes (--json lists all)")
+    rules = [f"  allowed: {rule}, {counted(count, 'pair')}" for rule, count in _rules(result).items()]
+    lines += _cut(rules, _NOTES, "more rules")
     if comparison is not None:
         lines += comparison_text(comparison)
     lines += _cut(_findings(result, comparison, accepted or {}), _LISTED, "more (--json or --html lists all)")
@@ -64,6 +68,12 @@ def check_to_text(
     return "\n".join([*lines, "", *work_text(result.work)])
 
 
+def _rules(result: CheckResult) -> dict[Allowed, int]:
+    """How many pairs each rule of the scene that speaks of more than one pair allows."""
+    allowed = {(row.a, row.b): None for row in result.rows if row.verdict is Verdict.ALLOWED}
+    return result.scene.pairs_by_rule(allowed)
+
+
 def comparison_text(comparison: Comparison) -> list[str]:
     """How the findings differ from the baseline's, in lines."""
     status = list(comparison.status.values())
@@ -72,7 +82,10 @@ def comparison_text(comparison: Comparison) -> list[str]:
         return [f"  {counted(n_accepted, 'group of findings', 'groups of findings')} accepted"] if n_accepted else []
     summary = f"  since the baseline: {status.count('new')} new, {status.count('changed')} changed"
     summary += f", {len(comparison.gone)} gone, {status.count('same')} unchanged, {n_accepted} accepted"
-    gone = (f"  gone: {old['a']} and {old['b']}, {old['verdict']}; id {old['id']}" for old in comparison.gone)
+    gone = [
+        f"  gone: {', '.join(_cut([f'{a} and {b}' for a, b in old['pairs']], _NOTES, 'more'))}: {old['verdict']}"
+        for old in comparison.gone
+    ]
     return [summary, *_moved(comparison.moved or {}), *gone]
 
 
@@ -106,9 +119,9 @@ def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapp
         if status == "accepted" and (entry := accepted.get(group.id)):
             status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
         shown = comparison is not None and (comparison.has_baseline or status.startswith("accepted"))
-        pairs = [] if comparison is None or status != "changed" else comparison.changed.get(group.id, ())
+        pairs = [] if comparison is None else comparison.changed.get(group.id, ())
         which = _cut([f"{a} and {b}" for a, b in pairs], _NOTES, "more")
-        changed = f"; changed: {', '.join(which)}" if which and len(group.rows) > 1 else ""
+        changed = f"; changed: {', '.join(which)}" if 0 < len(pairs) < len(group.rows) else ""
         return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}{changed}; id {group.id}"
 
     def matters(group: Group) -> bool:

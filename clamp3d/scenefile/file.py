@@ -78,7 +78,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
                 scenes[same] = part.read(folder)
             take(prefixed(scenes[same], part_name, part.pose.T()), part_name)
         where = "allowed"
-        allowed += [Allowed(*item.parts, item.overlap) for item in table.allowed]
+        allowed += [Allowed(*(item.parts or ("*", "*")), item.overlap, item.relation) for item in table.allowed]
         where = "motions"
         names = [part.name for part in parts]
         motions = tuple(m.motion(i, names) for i, m in enumerate(table.motions, 1))

@@ -195,10 +195,15 @@ class ClampTable(PartTable, kw_only=True):
 
 
 class AllowedTable(Table):
-    """``[[allowed]]``: two part names, or patterns, that may touch, and overlap by ``overlap`` mm."""
+    """``[[allowed]]``: two part names, or patterns, or a kind of fit, that may touch, and overlap by ``overlap`` mm."""
 
-    parts: tuple[str, str]
+    parts: tuple[str, str] | None = None
     overlap: Annotated[float, Meta(ge=0.0)] = 0.0
+    relation: Literal["running", "press", "thread", "duplicate"] | None = None
+
+    def __post_init__(self) -> None:
+        if self.parts is None and self.relation is None:
+            raise ValueError("parts: give two names or patterns, or a relation")
 
 
 class TurnTable(Table):

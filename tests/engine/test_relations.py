@@ -1,0 +1,81 @@
+"""How pins and holes fit: a table of drawn pairs, and what is no fit."""
+
+from dataclasses import replace
+
+import pytest
+
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.check import check
+from clamp3d.engine.relations import relation
+from clamp3d.engine.scene import Part, Scene
+from clamp3d.errors import InputError
+from clamp3d.geometry import shapes
+from clamp3d.geometry.pose import translation
+
+TURNED = translation(30.0, -7.0, 4.0) @ [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+
+
+def fit(radius, place=(0.0, 0.0, 0.0), hole=5.0, length=40.0):
+    """A pin in a tube whose bore has a radius of 5."""
+    tube = Part("tube", shapes.cylinder(9.0, 8.0, bore=hole), TURNED)
+    found = relation(tube, Part("pin", shapes.cylinder(radius, length), TURNED @ translation(*place)))
+    return found and (found.kind, found.overlap)
+
+
+@pytest.mark.parametrize(
+    ("radius", "expected"),
+    [
+        (4.9, None),
+        (4.99, ("running", 0.0)),
+        (5.0, ("running", 0.0)),
+        (5.01, ("press", 0.01)),
+        (5.1, ("thread", 0.1)),
+        (6.0, ("thread", 1.0)),
+        (7.0, None),
+    ],
+)
+def test_the_two_radii_say_how_they_fit(radius, expected):
+    assert fit(radius) == expected
+
+
+@pytest.mark.parametrize("place", [(0.01, 0.0, 0.0), (0.0, 0.0, 24.1), (0.0, 0.0, -24.1)])
+def test_a_pin_beside_or_beyond_its_hole_does_not_fit(place):
+    assert fit(5.01, place) is None
+
+
+def test_the_holes_of_a_block_are_found_wherever_they_are():
+    block = Part("block", shapes.box(40.0, 30.0, 8.0, holes=[shapes.Hole(3.0, (10.0, -2.0))]), TURNED)
+    pin = Part("pin", shapes.cylinder(3.01, 20.0), TURNED @ translation(10.0, -2.0, 3.0))
+    assert relation(block, pin).kind == relation(pin, block).kind == "press"
+
+
+def bolted(*rules, sink=0.0):
+    """A bolt in a nut; ``sink``: how far a pin on a plate stands in the plate."""
+    scene = Scene().add("nut", shapes.cylinder(9.0, 8.0, bore=4.2)).add("bolt", shapes.cylinder(5.0, 40.0))
+    scene = scene.add("plate", shapes.box(20.0, 20.0, 4.0), translation(50.0, 0.0, -2.0))
+    scene = scene.add("pin", shapes.cylinder(5.0, 40.0), translation(50.0, 0.0, 20.0 - sink))
+    return replace(scene, allowed=rules)
+
+
+def test_a_rule_covers_the_overlap_of_the_fit_and_no_other():
+    verdicts = {(row.a, row.b): row.verdict.value for row in check(bolted(sink=0.5)).pairs}
+    assert set(verdicts.values()) == {"clash"}
+    scene = bolted(Allowed(relation="thread"), sink=0.5)
+    verdicts = {frozenset((row.a, row.b)): row.verdict.value for row in check(scene).pairs}
+    assert verdicts == {frozenset(("nut", "bolt")): "allowed", frozenset(("plate", "pin")): "clash"}
+    shallow = check(bolted(Allowed(relation="thread", overlap=0.5)))
+    assert shallow.verdict("nut", "bolt").value == "clash"  # its threads overlap by 0.8
+
+
+def test_duplicates_can_be_meant():
+    ball = shapes.cylinder(5.0, 5.0)
+    scene = Scene().add("a", ball).add("b", ball)
+    assert check(scene).verdict("a", "b").value == "duplicate"
+    assert check(Scene(scene.parts, allowed=(Allowed(relation="duplicate"),))).verdict("a", "b").value == "allowed"
+
+
+def test_an_unknown_relation_is_one_line():
+    with pytest.raises(
+        InputError, match="allowed relation must be one of running, press, thread, duplicate, got 'glue'"
+    ):
+        Allowed(relation="glue")

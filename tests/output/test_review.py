@@ -1,0 +1,85 @@
+"""A bearing from a CAD library on a shaft with one planted fault, reviewed as somebody else's STEP file."""
+
+import io
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import clamp3d
+from clamp3d.output.groups import grouped
+
+pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not installed")
+pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+
+
+def bearing(path: Path, radius: float) -> Path:
+    """The bearing M8-22-7, whose balls overlap both races in its library's model, on a shaft of this radius."""
+    from bd_warehouse.bearing import SingleRowDeepGrooveBallBearing
+    from build123d import Compound, Cylinder, export_step
+
+    shaft = Cylinder(radius, 30.0)
+    shaft.label = "Shaft"
+    export_step(Compound(label="bearing", children=[SingleRowDeepGrooveBallBearing("M8-22-7"), shaft]), str(path))
+    return path
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its shaft is 0.03 mm too thick."""
+    return bearing(tmp_path_factory.mktemp("review") / "bearing.step", 4.03)
+
+
+def test_three_rows_and_the_planted_fault_is_the_first(faulty: Path) -> None:
+    rows = [(g.a, g.b, len(g.rows)) for g in grouped(clamp3d.check(faulty))]
+    assert (*sorted(rows[0][:2]), rows[0][2]) == ("InnerRace", "Shaft", 1)
+    assert sorted((*sorted(row[:2]), row[2]) for row in rows[1:]) == [
+        ("InnerRace", "Roller", 12),
+        ("OuterRace", "Roller", 12),
+    ]
+
+
+def test_the_second_review_names_exactly_the_change(faulty: Path, tmp_path: Path, main) -> None:
+    last = tmp_path / "last.json"
+    assert main("check", faulty, "--json", last, "-q")[0] == 1
+    assert "0 new, 0 changed, 0 gone, 3 unchanged" in main("check", faulty, "--baseline", last, "-q")[1]
+    mended = bearing(tmp_path / "bearing.step", 4.0)
+    code, out, _ = main("check", mended, "--baseline", last, "-q")
+    assert code == 0
+    assert "1 new, 0 changed, 1 gone, 2 unchanged" in out  # the shaft touches the race now
+    assert "  gone: InnerRace and Shaft: clash\n" in out
+    assert "new: InnerRace and Shaft touch" in out
+    assert "parts moved" not in out
+
+
+def test_a_rule_by_relation_covers_the_fit_and_nothing_else(faulty: Path, main) -> None:
+    code, out, _ = main("check", faulty, "--allow", "thread", "--allow", "*Race:Roller*=0.6", "-q")
+    assert code == 0
+    assert "  allowed: thread, 1 pair\n" in out
+    assert "  allowed: *Race:Roller* up to 0.6 mm, 24 pairs\n" in out
+    code, out, _ = main("check", faulty, "--allow", "press", "-q")  # 0.7 % of the radius is no press fit
+    assert code == 1
+    assert "  allowed: press, 0 pairs\n" in out
+    assert "InnerRace and Shaft clash" in out
+
+
+def test_pandas_and_the_schema_of_bcf_read_the_findings(faulty: Path, tmp_path: Path, main) -> None:
+    pandas, etree = pytest.importorskip("pandas"), pytest.importorskip("lxml.etree")
+    assert main("check", faulty, "--csv", tmp_path / "a.csv", "--bcf", tmp_path / "a.bcfzip", "-q")[0] == 1
+    frame = pandas.read_csv(tmp_path / "a.csv")
+    assert frame.groupby("id").size().tolist().count(12) == 2
+    assert (frame.at_least_mm <= frame.at_most_mm).all()
+    assert (frame.at_most_mm < 0.0).all()
+    package = zipfile.ZipFile(tmp_path / "a.bcfzip")
+    kinds = {"bcf.version": "version", "markup.bcf": "markup", "viewpoint.bcfv": "visinfo"}
+    folder = Path(__file__).parent / "bcf-2.1"
+    schemas = {kind: etree.XMLSchema(etree.parse(folder / f"{kind}.xsd")) for kind in kinds.values()}
+    topics = []
+    for name in package.namelist():
+        file = name.rpartition("/")[2]
+        if file in kinds:
+            document = etree.parse(io.BytesIO(package.read(name)))
+            schemas[kinds[file]].assertValid(document)
+            topics += [title.text for title in document.iter("Title")]
+    assert len(topics) == 3
+    assert topics[0].startswith("InnerRace and Shaft clash: overlap 0.0")
