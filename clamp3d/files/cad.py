@@ -69,8 +69,8 @@ def matrix(location: Any) -> Array:
     return T
 
 
-def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
-    """All solids below ``roots`` with names and places, equal ones sharing a shape; and how many different ones.
+def bodies_of(roots: Iterable[Node]) -> Reading:
+    """All solids below ``roots`` with names and places, equal ones sharing a shape.
 
     What is no solid is among the reading's missing. Raises InputError for too many bodies.
     """
@@ -105,7 +105,7 @@ def bodies_of(roots: Iterable[Node]) -> tuple[Reading, int]:
     if loose:
         holders = "1 product holds" if loose == 1 else f"{loose} products hold"
         collector.notes.append(f"{holders} curves or points only: left out")
-    return collector.reading(), len(shapes)
+    return collector.reading()
 
 
 def _leaves(nodes: Iterable[Node], assembly: Component | None) -> Iterator[tuple[Node, Component]]:

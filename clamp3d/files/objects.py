@@ -30,7 +30,7 @@ def read_object(source: Any) -> tuple[Reading, str]:
             "source must be a path, a clamp's name, or an object of CadQuery, build123d, Open CASCADE or trimesh, "
             f"got {shown(source)}"
         )
-    return bodies_of([node])[0], node.name
+    return bodies_of([node]), node.name
 
 
 def _node(item: Any) -> Node | None:

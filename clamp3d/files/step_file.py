@@ -7,6 +7,7 @@ This runs in a process of its own (`clamp3d.files.worker`): a damaged file can e
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.files.cad import Key, Node, bodies_of, matrix
-from clamp3d.files.open_cascade import require_open_cascade
+from clamp3d.files.open_cascade import explore, require_open_cascade
 from clamp3d.files.part21 import Announced, announced
 
 _OTHERS = {
@@ -30,6 +31,7 @@ _OTHERS = {
     "TESSELLATED_SHELL": "tessellated shells",
 }
 """Bodies that Open CASCADE does not make into solids."""
+_FAULT = re.compile("Parsing|Unresolved|SEVERAL TIMES")
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 
@@ -38,7 +40,6 @@ def read_step(path: Path, _: str | None = None) -> Reading:
 
     Raises InputError if its text is damaged or Open CASCADE cannot read it.
     """
-    found = announced(path)
     require_open_cascade()
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -49,12 +50,28 @@ def read_step(path: Path, _: str | None = None) -> Reading:
     document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
     reader = STEPCAFControl_Reader()
-    reader.SetNameMode(True)
-    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise InputError("not a readable STEP file, or it is cut off")
+    _check_whole(reader)
+    if not reader.Transfer(document):
         raise InputError("not a readable STEP file")
-    reading, solids = bodies_of(_roots(document, path.stem))
-    missing = (*found.orphans, *_lost(document, found, solids))
-    return replace(reading, missing=missing + reading.missing)
+    reading = bodies_of(_roots(document, path.stem))
+    return replace(reading, missing=(*_lost(document, announced(path)), *reading.missing))
+
+
+def _check_whole(reader: Any) -> None:
+    """Raise InputError for faults that Open CASCADE finds in the text, and reads on after them.
+
+    What it says of values that it only expects otherwise, as of a name that is no text, is no such fault.
+    """
+    checks = reader.Reader().WS().ModelCheckList(True)
+    checks.Start()
+    while checks.More():
+        check = checks.Value()
+        for k in range(1, check.NbFails() + 1):
+            if _FAULT.search(fault := str(check.CFail(k, True))):
+                raise InputError(f"the STEP file is damaged: {fault}")
+        checks.Next()
 
 
 def _roots(document: Any, stem: str) -> Iterator[Node]:
@@ -122,18 +139,20 @@ def _colour(label: Any) -> str | None:
     return None
 
 
-def _lost(document: Any, found: Announced, solids: int) -> Iterator[str]:
-    """Bodies and instances that the file announces and Open CASCADE has not made: ``solids`` different ones it has."""
+def _lost(document: Any, content: Announced) -> Iterator[str]:
+    """Bodies and instances that the file announces and Open CASCADE has not made."""
     from OCP.XCAFDoc import XCAFDoc_DocumentTool
     from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
 
+    yield from content.orphans
     for kind, words in _OTHERS.items():
-        if found.counts[kind]:
-            yield f"{found.counts[kind]} {words}, which Open CASCADE does not read"
-    if found.solids > solids:
-        yield f"{found.solids - solids} of the file's {found.solids} solids (not readable)"
-    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    instances = sum(Tool.IsComponent_s(below) for label in _children(tool.BaseLabel()) for below in _children(label))
-    uses, places = (found.counts[f"{kind}"] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
+        if content.counts[kind]:
+            yield f"{content.counts[kind]} {words}, which Open CASCADE does not read"
+    products = [*_children(XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).BaseLabel())]
+    shells = {Key(shell) for product in products for shell in explore(Tool.GetShape_s(product), "SHELL")}
+    if (closed := content.counts["CLOSED_SHELL"]) > len(shells):
+        yield f"{closed - len(shells)} of the file's {closed} closed shells (not readable)"
+    instances = sum(Tool.IsComponent_s(below) for product in products for below in _children(product))
+    uses, places = (content.counts[kind] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
     if max(uses, places) > instances or 0 < places < uses:
         yield f"{uses} instances in the tree, {places} places for them, {instances} read"
