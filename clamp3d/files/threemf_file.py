@@ -1,22 +1,24 @@
 """3MF files as placed meshes: what the build lists, its objects and their components, by lib3mf.
 
-This runs in the process for foreign files, whose limits are for archives that unpack to gigabytes, or name themselves
-into millions of components.
+This runs in the process for foreign files, whose limits are for archives that unpack to gigabytes.
 """
 
 from __future__ import annotations
 
 import re
+import zipfile
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from clamp3d.errors import InputError, missing
 from clamp3d.files.bodies import Reading
-from clamp3d.files.placing import Placer
+from clamp3d.files.placing import MOST_BODIES, Placer
 from clamp3d.geometry.mesh import Array
 
 try:
@@ -31,6 +33,7 @@ _HARMLESS = re.compile("attribute|namespace|metadata|texture|thumbnail|colou?r|p
 
 def read_3mf(path: Path, _: str | None) -> Reading:
     """The meshes of a 3MF file, each instance a body, in mm."""
+    _check_count(path)
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(False)
@@ -47,6 +50,21 @@ def read_3mf(path: Path, _: str | None) -> Reading:
             placer.place(obj.GetName() or path.stem, obj.GetResourceID(), partial(_arrays, obj), place)
     placer.missing += sorted(f"{text} (lib3mf)" for text in warnings if not _HARMLESS.search(text))
     return placer.reading()
+
+
+def _check_count(path: Path) -> None:
+    """Raise InputError if objects name each other into too many bodies, which would keep lib3mf busy for years."""
+    with zipfile.ZipFile(path) as archive:
+        texts = [archive.read(name) for name in archive.namelist() if name.endswith(".model")]
+    for text in texts:
+        if b"<component " not in text:
+            continue
+        bodies: Counter[str | None] = Counter()
+        for item in ElementTree.fromstring(text).iterfind(".//{*}object"):  # each after those that it is made of
+            parts = item.iterfind("{*}components/{*}component")
+            bodies[item.get("id")] = sum(bodies[part.get("objectid")] for part in parts) or 1
+        if max(bodies.values()) > MOST_BODIES:
+            raise InputError(f"more than {MOST_BODIES} bodies")
 
 
 def _meshes(obj: Any, T: Array) -> Iterator[tuple[Any, Array]]:

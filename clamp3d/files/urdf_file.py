@@ -12,7 +12,6 @@ import math
 import os
 from collections import Counter
 from functools import partial
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -27,7 +26,7 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import FORMATS, read
 from clamp3d.files.placing import Placer
 from clamp3d.files.worker import OUTSIDE
-from clamp3d.geometry.mesh import Array, IntArray, Mesh, make_mesh
+from clamp3d.geometry.mesh import Array, IntArray, make_mesh
 from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.geometry.shapes import MeshShape, Shape, box, cylinder
 
@@ -36,8 +35,6 @@ try:
 except ImportError:
     raise missing("yourdfpy", "URDF") from None
 
-_MOST_BYTES = 2**26
-
 
 def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
     """The shapes of a robot's links in mm, in the frame of the root link, at the values of its ``joints``.
@@ -45,74 +42,55 @@ def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
     Values are in rad, or mm for joints that slide; without one a joint is at 0, or its nearest limit.
     Raises InputError for a file that is no whole URDF, unknown joints and values out of their limits.
     """
-    checks.readable_file(path, _MOST_BYTES)
     root = ElementTree.parse(path).getroot()
     _check_whole(root)
     robot = yourdfpy.URDF.load(
         io.BytesIO(ElementTree.tostring(root)), load_meshes=False, build_scene_graph=True, load_collision_meshes=False
     )
     robot.update_cfg(_joint_values(robot, joints))
-    links = _Links(path)
+    placer = Placer()
     for link in robot.robot.links:
         T_link = np.asarray(robot.get_transform(link.name))
         for shape in link.collisions or link.visuals:
-            links.put(link.name, shape.geometry, T_link if shape.origin is None else T_link @ shape.origin)
+            T = nearest_rigid(T_link if shape.origin is None else T_link @ shape.origin)
+            T[:3, 3] *= 1000.0
+            if shape.geometry.mesh is None:
+                placer.add(link.name, _drawn(shape.geometry), T)
+                continue
+            file, scale = shape.geometry.mesh.filename, shape.geometry.mesh.scale
+            T = T @ np.diag([*np.broadcast_to(1.0 if scale is None else scale, 3), 1.0])
+            placer.place(link.name, file, partial(_triangles, path, file, placer.notes), T)
     if not all(link.collisions for link in robot.robot.links if link.visuals):
-        links.notes.append("links without collision shapes are taken by their visual ones")
-    return links.reading((joint.parent, joint.child) for joint in robot.robot.joints)
+        placer.notes.append("links without collision shapes are taken by their visual ones")
+    return placer.reading((joint.parent, joint.child) for joint in robot.robot.joints)
 
 
-class _Links(Placer):
-    """Collects the shapes of a robot's links."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.path = path
-        self._files: dict[Path, Mesh] = {}
-
-    def put(self, name: str, geometry: Any, T: Array) -> None:
-        """One more shape of the link ``name`` at ``T`` (4, 4), whose lengths are metres."""
-        if not np.isfinite(T).all():
-            raise InputError(f"a place in link {name} is not finite")
-        T = nearest_rigid(np.asarray(T, dtype=np.float64))
-        T[:3, 3] *= 1000.0
-        file = "" if geometry.mesh is None else geometry.mesh.filename
-        try:
-            if file:
-                mesh = self._mesh(file)
-                scale = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
-                self.place(name, mesh.name, partial(_arrays, mesh), T @ np.diag([*np.broadcast_to(scale, 3), 1.0]))
-            else:
-                self.add(name, _shape(geometry), T)
-        except InputError as error:
-            self.add(name, f"{file}: {error}" if file else str(error), T)
-
-    def _mesh(self, name: str) -> Mesh:
-        """The mesh of a file, as ROS reads it: numbers without a unit are metres, and the axes of glTF stay."""
-        path = _mesh_file(self.path, name)
-        if path not in self._files:
-            form = FORMATS.get(path.suffix.lower())
-            if form is None or form.reader.startswith("step"):
-                raise InputError(f"a mesh must be one of {', '.join(FORMATS)}, without STEP")
-            mesh = read(path, None if form.unit else "m").complete(path.name).merged(path.name)
-            if form.unit == "m":
-                mesh = make_mesh(mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), mesh.faces, name=path.name)
-            self.notes += [f"{path.name}: {note}" for note in mesh.notes]
-            self._files[path] = mesh
-        return self._files[path]
-
-
-def _arrays(mesh: Mesh) -> tuple[Array, IntArray]:
+def _triangles(robot: Path, file: str, notes: list[str]) -> tuple[Array, IntArray]:
+    """Vertices and faces of a mesh file, as ROS reads it: numbers without a unit are metres, glTF's axes stay."""
+    try:
+        path = _mesh_file(robot, file)
+        form = FORMATS.get(path.suffix.lower())
+        if form is None or form.reader.startswith("step"):
+            raise InputError(f"a mesh must be one of {', '.join(FORMATS)}, without STEP")
+        mesh = read(path, None if form.unit else "m").complete(path.name).merged(path.name)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    notes += [f"{path.name}: {note}" for note in mesh.notes]
+    if form.unit == "m":
+        return mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), mesh.faces
     return mesh.vertices, mesh.faces
 
 
-def _shape(geometry: Any) -> Shape:
-    """A box, a cylinder, or a sphere as facets, in mm. Raises InputError for sizes that are not > 0."""
-    if geometry.box is not None:
-        return box(tuple(1000.0 * float(x) for x in geometry.box.size))
-    if geometry.cylinder is not None:
-        return cylinder(1000.0 * geometry.cylinder.radius, 1000.0 * geometry.cylinder.length)
-    radius = checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius)
+def _drawn(geometry: Any) -> Shape | str:
+    """A box, a cylinder, or a sphere as facets, in mm; or which size of it is not > 0."""
+    try:
+        if geometry.box is not None:
+            return box(tuple(1000.0 * float(x) for x in geometry.box.size))
+        if geometry.cylinder is not None:
+            return cylinder(1000.0 * geometry.cylinder.radius, 1000.0 * geometry.cylinder.length)
+        radius = checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius)
+    except InputError as error:
+        return str(error)
     facets = trimesh.creation.icosphere(4, radius)
     nearest = float(np.abs(np.einsum("ij,ij->i", facets.triangles[:, 0], facets.face_normals)).min())
     return MeshShape(make_mesh(facets.vertices, facets.faces, name="sphere"), "off", "sphere", radius - nearest)
@@ -138,19 +116,15 @@ def _check_whole(root: ElementTree.Element) -> None:
     if root.tag != "robot":
         raise InputError(f"not a readable URDF file (it holds <{root.tag}>, not <robot>)")
     for kind in ("link", "joint"):
-        name, count = max(
-            Counter(item.get("name") for item in root.findall(kind)).items(), key=itemgetter(1), default=("", 0)
-        )
-        if count > 1:
-            raise InputError(f"{count} of its {kind}s are called {checks.shown(name)}")
+        counts = Counter(item.get("name") for item in root.findall(kind))
+        for name, count in counts.most_common(1):
+            if count > 1:
+                raise InputError(f"{count} of its {kind}s are called {checks.shown(name)}")
         if root.find(f"link//{kind}") is not None:
             raise InputError(f"a link holds another {kind}")
-    for link in root.findall("link"):
-        for item in (*link.findall("collision"), *link.findall("visual")):
-            if (count := len(item.findall("geometry/*"))) != 1:
-                raise InputError(
-                    f"a {item.tag} of link {checks.shown(link.get('name'))} must have 1 shape, got {count}"
-                )
+    for item in (*root.iterfind("link/collision"), *root.iterfind("link/visual")):
+        if (count := len(item.findall("geometry/*"))) != 1:
+            raise InputError(f"each {item.tag} of a link must have 1 shape, got {count}")
     tree: Any = networkx.MultiDiGraph()
     tree.add_nodes_from(link.get("name") for link in root.findall("link"))
     count = len(tree)

@@ -61,14 +61,24 @@ def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to be called before long work."""
     if path == STDOUT:
         return
-    folder = Path(os.path.realpath(path)).parent
     if path.is_dir():
         raise InputError(f"cannot write {short(path)}: it is a folder")
+    if not path.exists() or path.is_file():
+        _probe(Path(os.path.realpath(path)).parent, f"cannot write {short(path)}")
+
+
+def check_folder(folder: Path) -> None:
+    """Raise InputError if ``folder`` neither exists nor can be created: to be called before long work."""
+    nearest = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if os.path.lexists(parent))
+    _probe(nearest, f"cannot write into {short(folder)}")
+
+
+def _probe(folder: Path, problem: str) -> None:
+    """Raise InputError, which begins with ``problem``, if no file can be made in an existing folder."""
     try:
-        if not path.exists() or path.is_file():
-            tempfile.TemporaryFile(dir=folder).close()
+        tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        raise InputError(f"cannot write {short(path)}: {error.strerror}") from None
+        raise InputError(f"{problem}: {error.strerror}") from None
 
 
 def write_text(path: Path, text: str) -> None:
@@ -80,19 +90,6 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write ``data`` as JSON without NaN. Raises InputError if it cannot be written."""
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
-
-
-def check_folder(folder: Path) -> None:
-    """Raise InputError if ``folder`` neither exists nor can be created, to be called before long work."""
-    there = folder.absolute()
-    while not os.path.lexists(there):
-        there = there.parent
-    if any(len(os.fsencode(name)) > 255 for name in folder.parts):
-        raise InputError(f"cannot write into {short(folder)}: a name is longer than 255 bytes")
-    if not os.path.isdir(there):
-        raise InputError(f"cannot write into {folder}: {there} is not a folder")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"cannot write into {folder}: no permission to write in {there}")
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:

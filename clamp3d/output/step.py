@@ -46,9 +46,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "out.step"
-            transferred = writer.Transfer(tree.document)
-            _header(writer, title)
-            if not transferred or writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+            if not writer.Transfer(tree.document) or writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
                 raise Clamp3dError(f"Open CASCADE could not write {title} as STEP")
             return path.read_bytes()
     finally:
@@ -213,12 +211,3 @@ def location(T: Array) -> Any:
     transform = gp_Trsf()
     transform.SetValues(*T[:3].flatten().tolist())
     return TopLoc_Location(transform)
-
-
-def _header(writer: Any, title: str) -> None:
-    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-    from OCP.TCollection import TCollection_HAsciiString
-
-    header = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
-    header.SetName(TCollection_HAsciiString(title.encode("ascii", "replace").decode()))
-    header.SetOriginatingSystem(TCollection_HAsciiString("clamp3d"))

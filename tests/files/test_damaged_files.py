@@ -94,17 +94,13 @@ def test_odd_files_that_are_whole_are_read(tmp_path, raw):
         (TIP.replace("3", "9"), '<item objectid="1"/>', "not a readable 3MF file"),
         (TIP, '<item objectid="1"/><item objectid="2"/>', "not a readable 3MF file"),
         (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
+        (doubled(50), '<item objectid="51"/>', "more than 20000 bodies"),
         (TIP, "", "no body in the file"),
     ],
-    ids=["index", "object", "doubled", "empty"],
+    ids=["index", "object", "doubled", "doubled for years", "empty"],
 )
 def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
     refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
-
-
-def test_3mf_of_some_kilobytes_that_would_take_years_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setenv(LIMITS, "0.02")
-    refused(write_3mf(tmp_path / "a.3mf", doubled(50), '<item objectid="51"/>'), "not read in 1 s")
 
 
 def test_objects_components_and_build_items_of_3mf(tmp_path):
@@ -133,7 +129,7 @@ def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
-    n = 200_000
+    n = 100_000
     rows = "".join(f"v {k} {k % 7} {k % 11}\n" for k in range(n)) + "".join(
         f"f {k} {k + 1} {k + 2}\n" for k in range(1, n - 2)
     )
@@ -231,7 +227,7 @@ MORE = '<parent link="tip"/><child link="end"/>'
         ('"end"><c', '"tip"><c', "2 of its links are called 'tip'"),
         ('<link name="tip">', "<link>", "not a readable URDF file"),
         ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
-        ('<box size="0.1 0.1 0.02"/>', "", "a collision of link 'base' must have 1 shape, got 0"),
+        ('<box size="0.1 0.1 0.02"/>', "", "each collision of a link must have 1 shape, got 0"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
         ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
