@@ -14,6 +14,7 @@ _NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
 _RECORD = re.compile(r"#\s*0*(\d+)\s*=\s*([^;]+)")
 _TYPES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
 _REFERENCE = re.compile(r"#\s*0*(\d+)(?!\d|\s*=)")
+_FILE = re.compile(r"DOCUMENT_FILE\s*\(\s*'([^']+\.(?:stp|step))'", re.IGNORECASE)
 _PARTS = re.compile(
     "ADVANCED_FACE|FACE_SURFACE|(CLOSED|OPEN)_SHELL|EDGE_LOOP|FACE_(OUTER_)?BOUND|ORIENTED_EDGE|MANIFOLD_SOLID_BREP|"
     "BREP_WITH_VOIDS|FACETED_BREP|SHELL_BASED_SURFACE_MODEL|PRODUCT_DEFINITION|ITEM_DEFINED_TRANSFORMATION|"
@@ -27,15 +28,18 @@ class Announced:
     """What a STEP file says it holds.
 
     ``counts``: entities by their type in capitals. ``orphans``: entities that nothing refers to, but should, in words.
+    ``files``: names of other STEP files that hold its parts.
     """
 
     counts: Counter[str]
     orphans: tuple[str, ...]
+    files: tuple[str, ...]
 
 
 def announced(path: Path) -> Announced:
     """What the file announces."""
-    text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", path.read_bytes().decode("latin-1"))
+    raw = path.read_bytes().decode("latin-1")
+    text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", raw)
     types = {
         number: _TYPES.findall(content) if content[0] == "(" else [content.partition("(")[0].rstrip()]
         for number, content in _RECORD.findall(text)
@@ -48,4 +52,5 @@ def announced(path: Path) -> Announced:
             for number, kinds in types.items()
             if number in unused and kinds and _PARTS.fullmatch(kinds[0])
         ),
+        tuple(_FILE.findall(raw)),
     )

@@ -8,18 +8,21 @@ This runs in a process of its own (`clamp3d.files.worker`): a damaged file can e
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from clamp3d.checks import readable_file, shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.files.cad import Key, Node, bodies_of, matrix
 from clamp3d.files.open_cascade import explore, require_open_cascade
 from clamp3d.files.part21 import Announced, announced
+from clamp3d.files.worker import OUTSIDE, may_read
 
 _OTHERS = {
     "CSG_SOLID": "solids of constructive geometry",
@@ -41,7 +44,6 @@ def read_step(path: Path, _: str | None = None) -> Reading:
     Raises InputError if its text is damaged or Open CASCADE cannot read it.
     """
     require_open_cascade()
-    from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPCAFControl import STEPCAFControl_Reader
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDocStd import TDocStd_Document
@@ -50,13 +52,43 @@ def read_step(path: Path, _: str | None = None) -> Reading:
     document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
     reader = STEPCAFControl_Reader()
-    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-        raise InputError("not a readable STEP file, or it is cut off")
-    _check_whole(reader)
+    contents = _contents(path)
+    _open(reader, path)
     if not reader.Transfer(document):
         raise InputError("not a readable STEP file")
     reading = bodies_of(_roots(document, path.stem))
-    return replace(reading, missing=(*_lost(document, announced(path)), *reading.missing))
+    return replace(reading, missing=(*_lost(document, [*contents.values()]), *reading.missing))
+
+
+def _contents(path: Path) -> dict[Path, Announced]:
+    """What a file and the files that hold its parts announce. Raises InputError unless all of them are whole."""
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+
+    contents = {path: announced(path)}
+    waiting = [*contents[path].files]
+    while waiting:
+        name = waiting.pop()
+        if (file := path.parent / name) in contents:
+            continue
+        if not may_read(file, path.parent):
+            raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that")
+        try:
+            readable_file(file)
+            _open(STEPCAFControl_Reader(), file)
+        except InputError as error:
+            raise InputError(f"names {shown(name)}: {error}") from None
+        contents[file] = announced(file)
+        waiting += contents[file].files
+    return contents
+
+
+def _open(reader: Any, path: Path) -> None:
+    """Read the text of a file. Raises InputError if it is damaged."""
+    from OCP.IFSelect import IFSelect_ReturnStatus
+
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise InputError("not a readable STEP file, or it is cut off")
+    _check_whole(reader)
 
 
 def _check_whole(reader: Any) -> None:
@@ -139,20 +171,23 @@ def _colour(label: Any) -> str | None:
     return None
 
 
-def _lost(document: Any, content: Announced) -> Iterator[str]:
-    """Bodies and instances that the file announces and Open CASCADE has not made."""
+def _lost(document: Any, contents: Iterable[Announced]) -> Iterator[str]:
+    """Bodies and instances that the files announce and Open CASCADE has not made."""
     from OCP.XCAFDoc import XCAFDoc_DocumentTool
     from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
 
-    yield from content.orphans
+    counts: Counter[str] = Counter()
+    for content in contents:
+        yield from content.orphans
+        counts += content.counts
     for kind, words in _OTHERS.items():
-        if content.counts[kind]:
-            yield f"{content.counts[kind]} {words}, which Open CASCADE does not read"
+        if counts[kind]:
+            yield f"{counts[kind]} {words}, which Open CASCADE does not read"
     products = [*_children(XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).BaseLabel())]
     shells = {Key(shell) for product in products for shell in explore(Tool.GetShape_s(product), "SHELL")}
-    if (closed := content.counts["CLOSED_SHELL"]) > len(shells):
+    if (closed := counts["CLOSED_SHELL"]) > len(shells):
         yield f"{closed - len(shells)} of the file's {closed} closed shells (not readable)"
     instances = sum(Tool.IsComponent_s(below) for product in products for below in _children(product))
-    uses, places = (content.counts[kind] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
+    uses, places = (counts[kind] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
     if max(uses, places) > instances or 0 < places < uses:
         yield f"{uses} instances in the tree, {places} places for them, {instances} read"

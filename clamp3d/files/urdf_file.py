@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import math
-import os
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -25,7 +24,7 @@ from clamp3d.errors import InputError, missing
 from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import FORMATS, read
 from clamp3d.files.placing import Placer
-from clamp3d.files.worker import OUTSIDE
+from clamp3d.files.worker import OUTSIDE, may_read
 from clamp3d.geometry.mesh import Array, IntArray, make_mesh
 from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.geometry.shapes import MeshShape, Shape, box, cylinder
@@ -105,8 +104,7 @@ def _mesh_file(path: Path, name: str) -> Path:
         inner = (inside, Path(*inside.parts[1:]))
         files = [(folder / part, folder) for folder in path.resolve().parents for part in inner]
     for file, folder in files:
-        is_within = os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
-        if is_within and file.is_file():
+        if may_read(file, folder) and file.is_file():
             return file
     raise InputError(f"no such file in the robot's folder, the one above or its package; {OUTSIDE}=1 allows others")
 

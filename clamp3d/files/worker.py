@@ -64,6 +64,11 @@ def read_in_process(path: Path, option: Any = None) -> Reading:
     raise InputError(f"{short(path)}: {problem}")
 
 
+def may_read(file: Path, folder: Path) -> bool:
+    """Whether a file that another one names may be read: it is in the ``folder``, or the user allows all."""
+    return os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
+
+
 def _factor() -> float:
     text = os.environ.get(LIMITS, "1")
     try:

@@ -1,5 +1,7 @@
 """STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
 
+from contextlib import chdir
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_Sewing
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_StepModelType
 from OCP.TopoDS import TopoDS_Compound
 from step_scenes import nested, pin, plate, pose
 
@@ -173,3 +177,43 @@ def test_coloured_and_layered_faces_are_read(tmp_path):
     assert [part.name for part in scene.parts] == ["box"]
     mesh = scene.parts[0].shape.mesh
     assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)
+
+
+@pytest.fixture
+def in_files(tmp_path):
+    """An assembly of which each part is a file of its own."""
+    tree, truth = nested(np.random.default_rng(7))
+    tree.tool.UpdateAssemblies()
+    writer = STEPCAFControl_Writer()
+    with chdir(tmp_path):
+        assert writer.Transfer(tree.document, STEPControl_StepModelType.STEPControl_AsIs, "of_")
+        writer.Write("machine.step")
+    return tmp_path / "machine.step", truth
+
+
+def test_parts_in_files_of_their_own_are_read(in_files):
+    path, truth = in_files
+    assert {file.name for file in path.parent.iterdir()} == {"machine.step", "of_plate.stp", "of_pin: 5 x 10.stp"}
+    scene = load(path)
+    assert [part.name for part in scene.parts] == [name for name, _, _ in truth]
+    assert [part.shape.volume for part in scene.parts] == pytest.approx([size for _, size, _ in truth])
+
+
+def test_parts_in_files_that_are_lost_damaged_or_elsewhere_are_refused(in_files, tmp_path_factory):
+    path, _ = in_files
+    plate = path.parent / "of_plate.stp"
+    text = plate.read_text()
+    plate.write_text(text[: len(text) // 2])
+    with pytest.raises(InputError, match=r"names 'of_plate.stp': not a readable STEP file, or it is cut off"):
+        load(path)
+    plate.write_text(text.replace("MANIFOLD_SOLID_BREP", "MANIFOLD_SOLID_BRAP"))
+    with pytest.raises(InputError, match="1 of the file's 2 closed shells"):
+        load(path)
+    plate.unlink()
+    with pytest.raises(InputError, match=r"names 'of_plate.stp': .*no such file"):
+        load(path)
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "of_plate.stp"
+    elsewhere.write_text(text)
+    path.write_text(path.read_text().replace("of_plate.stp", f"../{elsewhere.parent.name}/of_plate.stp"))
+    with pytest.raises(InputError, match=r"of_plate.stp', which is outside of its folder"):
+        load(path)
