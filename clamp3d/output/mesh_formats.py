@@ -93,7 +93,8 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
     scene = trimesh.Scene()
     scene.graph.update(frame_to="root", frame_from=scene.graph.base_frame, matrix=_Z_UP_TO_Y_UP)  # type: ignore[no-untyped-call]
     nodes: dict[Component | None, tuple[str, Array]] = {None: ("root", np.eye(4))}
-    meshes: dict[tuple[int, str], PosedMesh] = {}
+    shown: list[PosedMesh] = []  # the first item of each mesh
+    meshes: dict[tuple[int, str], str] = {}
 
     def add(name: str, T: Array, assembly: Component | None, geometry: str | None = None) -> str:
         if assembly not in nodes:
@@ -107,18 +108,17 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
         return key
 
     for item in items:
-        own = id(item.mesh), item.colour
-        if own not in meshes:
+        geometry = meshes.setdefault((id(item.mesh), item.colour), f"mesh {len(meshes)}")
+        if geometry not in scene.geometry:
             local = trimesh.Trimesh(item.mesh.vertices / MILLIMETRES["m"] + 0.0, item.mesh.faces, process=False)
-            scene.geometry[f"mesh {len(meshes)}"] = local
-            meshes[own] = item
-        geometry = f"mesh {[*meshes].index(own)}"
-        add(item.label, item.T, item.component and item.component.assembly, geometry)
+            scene.geometry[geometry] = local
+            shown.append(item)
+        add(item.label, item.T, item.component.assembly if item.component else None, geometry)
 
     def finish(tree: dict[str, Any]) -> None:
         tree["asset"] = {"version": "2.0", "generator": "clamp3d", "extras": {"unit": "m", "mesh_error_mm": mesh_error}}
-        tree["materials"] = [_material(item) for item in meshes.values()]
-        for i, (entry, item) in enumerate(zip(tree["meshes"], meshes.values(), strict=True)):
+        tree["materials"] = [_material(item) for item in shown]
+        for i, (entry, item) in enumerate(zip(tree["meshes"], shown, strict=True)):
             entry["name"] = item.component.name if item.component else item.label
             for primitive in entry["primitives"]:
                 primitive["material"] = i

@@ -79,7 +79,7 @@ class _Tree:
         self._shapes.UpdateAssemblies()
 
     def _add(self, item: PlacedPart) -> None:
-        holder, T = self._assembly(item.component and item.component.assembly)
+        holder, T = self._assembly(item.component.assembly if item.component else None)
         product, colour = self._product(item)
         label = _named(self._shapes.AddComponent(holder, product, location(inverse(T) @ item.T)), item.label)
         if item.colour != colour:

@@ -8,85 +8,30 @@ import trimesh
 
 pytest.importorskip("OCP")
 
-from OCP.BRepGProp import BRepGProp
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-from OCP.GProp import GProp_GProps
 from OCP.Quantity import Quantity_Color
-from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_ExtendedString
-from OCP.TDF import TDF_ChildIterator, TDF_Label
-from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
-from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from clamp3d import check, export, load
 from clamp3d.kernel import translation
 from tests.files.step_scenes import Tree, pin, plate, pose
-from tests.output.test_export_open_cascade import name_of
+from tests.output.step_reader import children, read_step
 
 RED, GREEN, BLUE = "#FF0000", "#00FF00", "#0000FF"
 
 
-def children(label):
-    walk = TDF_ChildIterator(label)
-    while walk.More():
-        yield walk.Value()
-        walk.Next()
+def assert_same(leaf, other, colour):
+    assert leaf.path == other.path
+    assert (leaf.face_colours, leaf.colour) == (other.face_colours, colour)
+    assert leaf.volume == pytest.approx(other.volume, rel=1e-9)
+    np.testing.assert_allclose(leaf.T, other.T, atol=1e-9)
 
 
-def colour_of(label):
-    colour = Quantity_Color()
-    if XCAFDoc_ColorTool.GetColor_s(label, XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour):
-        return Quantity_Color.ColorToHex_s(colour).ToCString()
-    return None
-
-
-def volume(shape):
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
-    return round(properties.Mass(), 6)
-
-
-class Leaf:
-    """A part as Open CASCADE's reader finds it: product names from the root, and what the file says of it."""
-
-    def __init__(self, path, label, place, colour):
-        self.path, self.colour = path, colour or colour_of(label)
-        shape = XCAFDoc_ShapeTool.GetShape_s(label)
-        self.solid, self.volume = shape.TShape(), volume(shape)
-        M = place.Transformation()
-        self.T = np.array([[M.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-        self.face_colours = sorted(filter(None, map(colour_of, children(label))))
-
-    def same_as(self, other, colour):
-        assert self.path == other.path
-        assert (self.volume, self.face_colours, self.colour) == (other.volume, other.face_colours, colour)
-        np.testing.assert_allclose(self.T, other.T, atol=1e-9)
-
-
-def leaves(path):
-    """Parts in the order of the tree, by the name of their components."""
-    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-    reader = STEPCAFControl_Reader()
-    reader.ReadFile(str(path))
-    assert reader.Transfer(document)
-    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-
-    def walk(label, place, above, name, colour):
-        below = [child for child in children(label) if XCAFDoc_ShapeTool.IsComponent_s(child)]
-        names = (*above, name_of(label))
-        if not below:
-            yield name, Leaf(names, label, place, colour)
-        for component in below:
-            product = TDF_Label()
-            XCAFDoc_ShapeTool.GetReferredShape_s(component, product)
-            at = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(component))
-            yield from walk(product, at, names, name_of(component), colour_of(component))
-
-    for label in children(tool.BaseLabel()):
-        if XCAFDoc_ShapeTool.IsFree_s(label):
-            yield from walk(label, XCAFDoc_ShapeTool.GetLocation_s(label), (), name_of(label), None)
+def by_name(path):
+    return {leaf.name: leaf for leaf in read_step(path)}
 
 
 def coloured(path):
@@ -123,16 +68,16 @@ def machine(tmp_path):
 
 
 def test_tree_names_colours_and_instances_stay(machine, tmp_path):
-    before, scene = list(leaves(machine)), load(machine)
-    after = list(leaves(export(scene, tmp_path / "again.step").files[0]))
-    assert [name for name, _ in after] == [part.name for part in scene.parts]
-    assert [part.path for _, part in after][1] == ("machine", "sub, assembly", "pin")
-    own = after[0][1].colour  # the program's, where the file states none
-    for (_, was), (_, part) in zip(before, after, strict=True):
-        part.same_as(was, was.colour or own)
-    assert [part.colour for _, part in after] == [own, GREEN, own, GREEN, GREEN, BLUE]
-    assert [part.face_colours for _, part in after] == [[RED], [], [RED], [], [], []]
-    assert len({part.solid for _, part in after}) == len({part.solid for _, part in before}) == 2
+    before, scene = read_step(machine), load(machine)
+    after = read_step(export(scene, tmp_path / "again.step").files[0])
+    assert [leaf.name for leaf in after] == [part.name for part in scene.parts]
+    assert after[1].path == ("machine", "sub, assembly", "pin")
+    own = after[0].colour  # the program's, where the file states none
+    for was, leaf in zip(before, after, strict=True):
+        assert_same(leaf, was, was.colour or own)
+    assert [leaf.colour for leaf in after] == [own, GREEN, own, GREEN, GREEN, BLUE]
+    assert [leaf.face_colours for leaf in after] == [[RED], [], [RED], [], [], []]
+    assert len({leaf.solid for leaf in after}) == len({leaf.solid for leaf in before}) == 2
     assert [part.name for part in load(tmp_path / "again.step").parts] == [part.name for part in scene.parts]
 
 
@@ -142,7 +87,7 @@ def test_parts_with_a_finding_have_the_programs_colour(machine, tmp_path):
     result = check(scene.moved({"pin_1": place["plate_1"]}))
     (row,) = result.findings
     assert {row.a, row.b} == {"plate_1", "pin_1"}
-    after = dict(leaves(export(result, tmp_path / "found.step").files[0]))
+    after = by_name(export(result, tmp_path / "found.step").files[0])
     clash = f"clash {row.a} - {row.b}"
     assert [*after] == [*place, clash]
     assert after[clash].path == ("machine", clash)
@@ -154,15 +99,13 @@ def test_parts_with_a_finding_have_the_programs_colour(machine, tmp_path):
 
 
 def test_a_chosen_part_and_a_part_of_one_product(machine, tmp_path):
-    ((name, part),) = leaves(export(load(machine), tmp_path / "pin.step", names=["pin_2"]).files[0])
-    assert (name, part.path) == ("pin_2", ("machine", "sub, assembly", "pin"))
+    (leaf,) = read_step(export(load(machine), tmp_path / "pin.step", names=["pin_2"]).files[0])
+    assert (leaf.name, leaf.path) == ("pin_2", ("machine", "sub, assembly", "pin"))
     tree = Tree()
     tree.product("lid", plate())
-    before, after = (
-        list(leaves(path))
-        for path in (tree.write(tmp_path / "a.step"), export(load(tmp_path / "a.step"), tmp_path / "b.step").files[0])
-    )
-    assert [(name, part.path) for name, part in after] == [(name, part.path) for name, part in before]
+    (before,) = read_step(tree.write(tmp_path / "a.step"))
+    (after,) = read_step(export(load(tmp_path / "a.step"), tmp_path / "b.step").files[0])
+    assert (after.name, after.path) == (before.name, before.path)
 
 
 def test_equal_solids_of_two_products_and_solids_of_one_keep_their_names(tmp_path):
@@ -171,8 +114,8 @@ def test_equal_solids_of_two_products_and_solids_of_one_keep_their_names(tmp_pat
     for k, name in enumerate(("left pad", "right pad")):
         tree.put(root, tree.product(name, BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape()), translation(5 * k, 0, 0), "pad")
     scene = load(tree.write(tmp_path / "pads.step"))
-    again = dict(leaves(export(scene, tmp_path / "again.step").files[0]))
-    assert {name: part.path for name, part in again.items()} == {
+    again = by_name(export(scene, tmp_path / "again.step").files[0])
+    assert {name: leaf.path for name, leaf in again.items()} == {
         "left-pad": ("pads", "left pad"),
         "right-pad": ("pads", "right pad"),
     }
@@ -184,7 +127,7 @@ def test_two_files_of_a_scene_are_two_trees(machine, tmp_path):
         '[parts.ball]\nshape = "cylinder"\nradius = 1\nlength = 2\n'
     )
     scene = load(tmp_path / "two.toml")
-    after = dict(leaves(export(scene, tmp_path / "out.step").files[0]))
+    after = by_name(export(scene, tmp_path / "out.step").files[0])
     assert [*after] == [part.name for part in scene.parts]
     for part in scene.parts:
         np.testing.assert_allclose(after[part.name].T, part.T_world[:3], atol=1e-9)
@@ -217,12 +160,12 @@ def test_a_bearing_of_bd_warehouse_keeps_its_rollers(tmp_path):
     bd = pytest.importorskip("build123d")
     bearing = pytest.importorskip("bd_warehouse.bearing")
     bd.export_step(bearing.SingleRowDeepGrooveBallBearing(size="M8-22-7", bearing_type="SKT"), tmp_path / "in.step")
-    before, scene = list(leaves(tmp_path / "in.step")), load(tmp_path / "in.step")
-    after = list(leaves(export(scene, tmp_path / "out.step").files[0]))
-    assert [name for name, _ in after] == [part.name for part in scene.parts]
-    assert [part.path for _, part in after] == [part.path for _, part in before]
-    assert sorted(part.volume for _, part in after) == pytest.approx(sorted(part.volume for _, part in before))
-    assert len({part.solid for _, part in after}) == len({part.solid for _, part in before})
+    before, scene = read_step(tmp_path / "in.step"), load(tmp_path / "in.step")
+    after = read_step(export(scene, tmp_path / "out.step").files[0])
+    assert [leaf.name for leaf in after] == [part.name for part in scene.parts]
+    for was, leaf in zip(before, after, strict=True):
+        assert_same(leaf, was, was.colour or leaf.colour)
+    assert len({leaf.solid for leaf in after}) == len({leaf.solid for leaf in before})
 
 
 def test_glb_has_the_tree_and_shares_meshes_of_one_colour(machine, tmp_path):
