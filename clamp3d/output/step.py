@@ -5,9 +5,8 @@ Needs the extra ``step`` (cadquery-ocp-novtk); imported when a file is written.
 
 from __future__ import annotations
 
-import tempfile
+import io
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,11 +43,10 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     before = Interface_Static.CVal_s("write.step.unit")
     Interface_Static.SetCVal_s("write.step.unit", UNITS[unit])
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "out.step"
-            if not writer.Transfer(tree.document) or writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-                raise Clamp3dError(f"Open CASCADE could not write {title} as STEP")
-            return path.read_bytes()
+        stream, done = io.BytesIO(), IFSelect_ReturnStatus.IFSelect_RetDone
+        if not writer.Transfer(tree.document) or writer.WriteStream(stream) != done:
+            raise Clamp3dError(f"Open CASCADE could not write {title} as STEP")
+        return stream.getvalue()
     finally:
         Interface_Static.SetCVal_s("write.step.unit", before)
 

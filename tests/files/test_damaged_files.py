@@ -291,6 +291,28 @@ def test_a_clean_check_says_so_whatever_becomes_of_its_streams(tmp_path, streams
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits as Linux has them")
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [(["check", "a.3mf"], 0, ""), (["export", "a.3mf", "-o", "b.glb"], 2, "cannot write b.glb: File too large")],
+)
+def test_where_nothing_can_be_written_files_are_read(tmp_path, arguments, code, said):
+    import resource
+
+    two = '<item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/>'
+    write_3mf(tmp_path / "a.3mf", build=two)
+    run = subprocess.run(
+        [sys.executable, "-m", "clamp3d", *arguments],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert (run.returncode, run.stderr.removeprefix("clamp3d: error: ").strip()) == (code, said)
+
+
 @pytest.mark.parametrize("key", ["a." * 50_000 + "b = 1", 'x = { "a" . ' + "b . " * 9000 + "c = 1 }"])
 def test_a_key_of_a_hundred_kilobytes_is_refused(tmp_path, key):
     path = tmp_path / "scene.toml"
