@@ -187,37 +187,39 @@ def on_axis_end(groove: Groove, rod: Rod, t: float, best: Candidate) -> Candidat
 
 
 @inlined
+def beside_line(wu: float, wv: float, du: float, dv: float, most: float) -> tuple[float, float]:
+    """Squared distance of the axis from a line that it faces, and the place t there; infinite if not below ``most``.
+
+    (wu, wv) leads from the line to the axis' middle and (du, dv) is its direction, both seen along the line.
+    """
+    cross = wu * dv - wv * du
+    square = du * du + dv * dv
+    if cross * cross >= most * square:  # the distance of the lines
+        return math.inf, 0.0
+    over = 1.0 / max(square, TINY)
+    return cross * cross * over, -(wu * du + wv * dv) * over
+
+
+@inlined
 def on_lip(groove: Groove, rod: Rod, side: float, best: Candidate) -> Candidate:
     """The best so far, or the inside of the lip on a side (-1: M, 1: N) that the axis' inside faces."""
-    d = rod.axis
-    sx = side * groove.s
-    wx, wy = rod.centre.x - sx, rod.centre.y - groove.h
-    cross = wx * d.y - wy * d.x
-    if cross * cross >= best.d2 * rod.e2:  # the distance of the lines
+    c, d, sx = rod.centre, rod.axis, side * groove.s
+    d2, t = beside_line(c.x - sx, c.y - groove.h, d.x, d.y, best.d2)
+    z = c.z + t * d.z
+    if d2 == math.inf or abs(t) > rod.half or abs(z) > groove.H:
         return best
-    over = 1.0 / rod.e2
-    t = -(wx * d.x + wy * d.y) * over
-    z = rod.centre.z + t * d.z
-    if abs(t) > rod.half or abs(z) > groove.H:
-        return best
-    return Candidate(cross * cross * over, t, LIP_M if side < 0.0 else LIP_N, Vector(sx, groove.h, z))
+    return Candidate(d2, t, LIP_M if side < 0.0 else LIP_N, Vector(sx, groove.h, z))
 
 
 @inlined
 def on_end_edge(groove: Groove, rod: Rod, ez: float, best: Candidate) -> Candidate:
     """The best so far, or a point of the edges {y = h, z = ez, |x| >= s} that the axis' inside faces."""
-    d = rod.axis
-    wy, wz = rod.centre.y - groove.h, rod.centre.z - ez
-    f2 = d.y * d.y + d.z * d.z
-    cross = wy * d.z - wz * d.y
-    if cross * cross >= best.d2 * f2:
+    c, d = rod.centre, rod.axis
+    d2, t = beside_line(c.y - groove.h, c.z - ez, d.y, d.z, best.d2)
+    x = c.x + t * d.x
+    if d2 == math.inf or abs(t) > rod.half or abs(x) < groove.s:
         return best
-    over = 1.0 / max(f2, TINY)
-    t = -(wy * d.y + wz * d.z) * over
-    x = rod.centre.x + t * d.x
-    if abs(t) > rod.half or abs(x) < groove.s:
-        return best
-    return Candidate(cross * cross * over, t, END_EDGE_M if x < 0.0 else END_EDGE_N, Vector(x, groove.h, ez))
+    return Candidate(d2, t, END_EDGE_M if x < 0.0 else END_EDGE_N, Vector(x, groove.h, ez))
 
 
 @inlined
@@ -292,6 +294,33 @@ def farther_root(k: float, a: float, q: float) -> float:
 
 
 @inlined
+def stationary(k: float, a: float, q: float, is_nearest: bool) -> tuple[float, float]:
+    """Where the distance of a point from an ellipse has a local minimum: cosine and sine from its major axis.
+
+    They are C = a / (k + mu), S = q / mu with C^2 + S^2 = 1. Only the root mu > 0 (the least distance) and the largest
+    mu < 0 (a local minimum on the other side of the major axis) are minima; solving for them this way loses no digits
+    where the quartic's roots run together. On the major axis within the evolute there are two mirrored minima. C is
+    NaN where there is none.
+    """
+    if abs(q) <= TINY and abs(a) <= k:
+        C = a / k
+        S = math.sqrt(max(0.0, 1.0 - C * C))
+        return C, S if is_nearest else -S
+    if is_nearest:
+        mu = nearer_root(k, abs(a), abs(q))
+    else:
+        mu = -farther_root(k, abs(a), abs(q))
+        if mu >= 0.0:
+            return math.nan, 0.0
+    both = 1.0 / ((k + mu) * mu)
+    C, S = a * (mu * both), q * ((k + mu) * both)
+    g = C * C + S * S
+    # At g near 1 the root by its series, whose next term is below the rounding: without waiting for a root.
+    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+    return C * n, S * n
+
+
+@inlined
 def end_circle(groove: Groove, rod: Rod, ez: float) -> EndCircle:
     """The circle of the end arc in the plane z = ez, seen along the axis."""
     R, e, c, d = groove.R, math.sqrt(rod.e2), rod.centre, rod.axis
@@ -307,13 +336,9 @@ def end_circle(groove: Groove, rod: Rod, ez: float) -> EndCircle:
 
 
 @inlined
-def circle_point(groove: Groove, rod: Rod, circle: EndCircle, C: float, S: float) -> Candidate:
-    """A point of an end arc by its direction (C, S) on the ellipse; infinite if the axis' inside does not face it."""
-    g = C * C + S * S
-    # At g near 1 the root by its series, whose next term is below the rounding: without waiting for a root.
-    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
-    C *= n
-    S *= n
+def circle_point(groove: Groove, rod: Rod, circle: EndCircle, is_nearest: bool) -> Candidate:
+    """A local minimum of the distance from an end arc's circle; infinite if the axis' inside does not face the arc."""
+    C, S = stationary(rod.e2, circle.p, abs(rod.axis.z) * circle.v, is_nearest)
     q = Vector(groove.R * (S * circle.ex - C * circle.ey), groove.R * (S * circle.ey + C * circle.ex), circle.z)
     t = dot(minus(q, rod.centre), rod.axis)
     du = groove.R * (C - circle.p)
@@ -322,47 +347,18 @@ def circle_point(groove: Groove, rod: Rod, circle: EndCircle, C: float, S: float
     return Candidate(du * du + dv * dv if is_faced else math.inf, t, END_ARC, q)
 
 
-@formula
-def farther_point(groove: Groove, rod: Rod, circle: EndCircle) -> Candidate:
-    """The local minimum of `on_end_arc` on the other side of the ellipse's major axis."""
-    k, q, a = rod.e2, abs(rod.axis.z) * circle.v, abs(circle.p)
-    nu = farther_root(k, a, abs(q))
-    if nu <= 0.0:
-        return Candidate(math.inf, 0.0, END_ARC, rod.centre)
-    return circle_point(groove, rod, circle, circle.p / (k - nu), -q / nu)
-
-
-@formula
-def mirrored_points(groove: Groove, rod: Rod, circle: EndCircle) -> Candidate:
-    """The nearer of two mirrored minima: the axis is on the ellipse's major axis, within the evolute."""
-    C = circle.p / rod.e2
-    S = math.sqrt(max(0.0, 1.0 - C * C))
-    first = circle_point(groove, rod, circle, C, S)
-    second = circle_point(groove, rod, circle, C, -S)
-    return second if second.d2 < first.d2 else first
-
-
 @inlined
 def on_end_arc(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> Candidate:
     """The best so far, or the point of an end arc that is nearest to the axis' inside.
 
     The distance of the axis, a point, from the ellipse at angle phi is a trigonometric polynomial of degree two in phi,
-    its stationary points a quartic. With C, S the cosine and sine from the major axis, they are C = p / (k + mu),
-    S = q / mu, C^2 + S^2 = 1 with k = dx^2 + dy^2. Only the root mu > 0 (the least distance) and the largest mu < 0
-    (the local minimum on the other side of the major axis) are minima; solving for them this way loses no digits where
-    the quartic's roots run together (axis through the arc's centre, small tilt).
+    its stationary points a quartic, of which two can be minima.
     """
     if circle.reach * circle.reach >= best.d2:
         return best
-    k, q, a = rod.e2, abs(rod.axis.z) * circle.v, abs(circle.p)
-    if abs(q) > TINY or a > k:
-        mu = nearer_root(k, a, abs(q))
-        both = 1.0 / ((k + mu) * mu)
-        point = circle_point(groove, rod, circle, circle.p * (mu * both), q * ((k + mu) * both))
-        if point.d2 == math.inf and a + abs(q) < k:
-            point = farther_point(groove, rod, circle)
-    else:
-        point = mirrored_points(groove, rod, circle)
+    point = circle_point(groove, rod, circle, True)
+    if point.d2 == math.inf and abs(circle.p) + abs(rod.axis.z * circle.v) < rod.e2:
+        point = circle_point(groove, rod, circle, False)
     return point if point.d2 < best.d2 else best
 
 

@@ -25,10 +25,8 @@ from clamp3d.kernel.nearest import (
     Answer,
     inside,
     inside_rate,
-    is_parallel,
     mixture,
     nearest,
-    parallel,
     way_out,
 )
 from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus, times
@@ -124,24 +122,15 @@ def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint
     """
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
     d, e2, e = rod.axis, rod.e2, math.sqrt(rod.e2)
-    ex, ey = d.x / e, d.y / e
+    ex, ey = (d.x / e, d.y / e) if e > 0.0 else (1.0, 0.0)
     radius = rod.r - inset
     middle = features.axis_point(rod, end * (rod.half - inset))
     b = abs(d.z)
     p = (ex * middle.y - ey * middle.x) / radius
     v = (ex * middle.x + ey * middle.y) / radius
-    q, a = abs(p), abs(b * v)
-    if q > features.TINY or a > e2:
-        k = features.nearer_root(e2, a, q) if is_farthest else -features.farther_root(e2, a, q)
-        if not is_farthest and k >= 0.0:
-            return none
-        C, S = p / k, b * v / (k + e2)
-        n = 1.0 / math.sqrt(C * C + S * S)
-        C *= n
-        S *= n
-    else:
-        S = b * v / e2
-        C = math.sqrt(max(0.0, 1.0 - S * S)) * (1.0 if is_farthest else -1.0)
+    S, C = features.stationary(e2, b * v, p, is_farthest)
+    if math.isnan(S):
+        return none
     # The minor axis in space: across the cylinder's axis, (ex dz, ey dz, -e), with the sign that makes ex, ey rise.
     out = Vector(-ey * C + ex * b * S, ex * C + ey * b * S, -e * math.copysign(1.0, d.z) * S)
     point = plus(middle, radius, out)
@@ -242,10 +231,9 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     search = on_face(groove, rod, Vector(0.0, 1.0, 0.0), h, search)
     search = on_face(groove, rod, Vector(0.0, 0.0, 1.0), H, search)
     search = on_face(groove, rod, Vector(0.0, 0.0, -1.0), H, search)
-    if rod.e2 > 0.0:
-        outer = 1.0 if c.x * d.x + c.y * d.y >= 0.0 else -1.0  # the end farther from the groove's axis
-        for k in range(4):
-            search = on_arc_surface(groove, rod, outer if k % 2 == 0 else -outer, k < 2, search)
+    outer = 1.0 if c.x * d.x + c.y * d.y >= 0.0 else -1.0  # the end farther from the groove's axis
+    for k in range(4):
+        search = on_arc_surface(groove, rod, outer if k % 2 == 0 else -outer, k < 2, search)
     if search.f < math.inf and search.limit <= search.least:
         return search
     is_above = c.y + rod.half * abs(d.y) + rod.r * math.sqrt(d.x * d.x + d.z * d.z) >= h
@@ -296,7 +284,7 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
     w, t = from_axis(rod, point)
     f, g, e = best.f, w - rod.r, abs(t) - rod.half
     to_end = times(-1.0 if t >= 0.0 else 1.0, rod.axis)  # from the point back to the end, and to the side
-    to_side = to_end
+    to_side = Vector(0.0, 0.0, 0.0)
     if w > features.TINY:
         to_side = over(plus(point, -t, rod.axis), -w)
     else:
@@ -319,42 +307,6 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
     return normal, normal, t
 
 
-@formula
-def flat_parallel(groove: Groove, rod: Rod) -> Answer:
-    """Axis along z: the plane problem of a disc and the section, and the gap along z."""
-    x, y, z = rod.centre
-    r, half, H = rod.r, rod.half, groove.H
-    gap, feature = features.section(groove, x, y)
-    end = abs(z) - H
-    bound = UNIT * (6.0 * (groove.R + abs(x) + abs(y)) + 4.0 * (H + abs(z) + half) + r)
-    if gap < 0.0 and end <= max(half - r, 0.0):  # the groove goes on where nothing is left of the cylinder
-        if half >= r:
-            return parallel(groove, shrunk(rod))
-        return left_of_disc(groove, rod, bound)
-    g, e = gap - r if gap > 0.0 else -r, max(end, 0.0) - half
-    if feature == features.ARC and gap > 0.0:
-        g = (groove.R - r) - math.sqrt(x * x + y * y)
-    f = features.phi(g, e)
-    qx, qy, nx, ny = features.section_foot(groove, feature, x, y)
-    if gap <= 0.0:
-        qx, qy = x, y
-    above = 1.0 if z > 0.0 else -1.0
-    lo, hi = max(z - half, -H), min(z + half, H)
-    qz, normal = 0.5 * (lo + hi) if lo <= hi else above * H, Vector(nx, ny, 0.0)
-    if g > 0.0 and e > 0.0:
-        normal = Vector(nx * (g / f), ny * (g / f), above * (e / f))
-        feature = features.beyond_end(feature)
-    elif g >= e:
-        if g < 0.0 and abs(qz - z) - half > g:  # the middle of the line of contact is nearer to an end
-            qz = min(max(z, -H), H)
-    else:
-        qz = min(max(z, -H), H)
-        normal = Vector(0.0, 0.0, above)
-        if end >= 0.0:
-            feature = features.END_FACE if gap <= 0.0 else features.beyond_end(feature)
-    return Answer(f, Vector(qx, qy, qz), normal, feature, (qz - z) * math.copysign(1.0, rod.axis.z), bound)
-
-
 @inlined
 def left_of_disc(groove: Groove, rod: Rod, bound: float) -> Answer:
     """What is left last of a cylinder that is wider than long, its middle, in the material."""
@@ -366,20 +318,6 @@ def left_of_disc(groove: Groove, rod: Rod, bound: float) -> Answer:
 def shrunk(rod: Rod) -> Rod:
     """The capsule of what is left last of a cylinder that is longer than wide."""
     return Rod(rod.centre, rod.axis, rod.e2, rod.r, rod.half - rod.r)
-
-
-@formula
-def parallel_with_rate(groove: Groove, rod: Rod) -> tuple[Answer, Vector]:
-    """Answer and rate for an axis along z."""
-    answer = flat_parallel(groove, rod)
-    rate = answer.normal
-    if rod.half < rod.r:
-        if abs(answer.distance + rod.half) <= answer.bound:
-            rate = Vector(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
-    elif answer.distance < -rod.r:
-        along_z = Vector(0.0, 0.0, math.copysign(1.0, rod.axis.z))
-        rate = inside_rate(groove, Rod(rod.centre, along_z, 0.0, rod.r, rod.half - rod.r), answer.t)
-    return answer, rate
 
 
 @formula
@@ -438,8 +376,6 @@ def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Vector]
 @inlined
 def flat_nearest(groove: Groove, rod: Rod) -> tuple[Answer, Vector]:
     """Signed distance of a flat-ended cylinder, and its rate by a shift."""
-    if is_parallel(groove, rod, max(rod.half, rod.r)):
-        return parallel_with_rate(groove, rod)
     capsule = nearest(groove, rod)
     if is_of_capsule(rod, capsule):
         return capsule, capsule.normal

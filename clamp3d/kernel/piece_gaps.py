@@ -17,9 +17,9 @@ from clamp3d.kernel.features import Candidate, Groove, Rod
 from clamp3d.kernel.jit import entry, formula, inlined
 from clamp3d.kernel.nearest import edge_normal, is_parallel
 from clamp3d.kernel.pose_rows import rigid, rod_at
-from clamp3d.kernel.vector import Vector, cross, length, minus, over, put
+from clamp3d.kernel.vector import Vector, cross, dot, length, minus, over, put
 
-ARC_SURFACE, FACE_M, FACE_N = range(3)
+ARC_SURFACE, FACE_M, FACE_N, END_BELOW, END_ABOVE = range(5)
 
 
 class Gap(NamedTuple):
@@ -39,23 +39,30 @@ def side_of(piece: int, x: float) -> float:
     return 1.0 if piece == FACE_N or (piece == ARC_SURFACE and x >= 0.0) else -1.0
 
 
+@inlined
+def end_of(piece: int) -> float:
+    """Sign of z of an end face."""
+    return -1.0 if piece == END_BELOW else 1.0
+
+
 @formula
-def piece_section(groove: Groove, piece: int, p: Vector) -> tuple[float, float, float, float]:
-    """Distance of (x, y) from the section of a side piece alone, nearest point, feature."""
-    R, s, h = groove.R, groove.s, groove.h
-    side = side_of(piece, p.x)
+def section_foot_of(groove: Groove, piece: int, x: float, y: float) -> tuple[float, float, float]:
+    """Nearest point (x, y) of the section of a piece, and its feature; on an end face the point itself."""
+    s, h = groove.s, groove.h
+    if piece >= END_BELOW:
+        gap, feature = features.section(groove, x, y)
+        if gap <= 0.0:
+            return x, y, features.END_FACE
+        qx, qy, _, _ = features.section_foot(groove, feature, x, y)
+        return qx, qy, features.beyond_end(feature)
+    side = side_of(piece, x)
     if piece == ARC_SURFACE:
-        if abs(p.x) * -h + p.y * s <= 0.0:
-            rho = math.sqrt(p.x * p.x + p.y * p.y)
-            return (
-                (abs(R - rho), p.x / rho * R, p.y / rho * R, features.ARC)
-                if rho >= features.TINY
-                else (R, 0.0, -R, features.ARC)
-            )
-    elif side * p.x >= s:
-        return abs(p.y - h), p.x, h, features.FLAT_N if side > 0.0 else features.FLAT_M
-    lip = features.LIP_N if side > 0.0 else features.LIP_M
-    return math.sqrt((side * p.x - s) * (side * p.x - s) + (p.y - h) * (p.y - h)), side * s, h, lip
+        if abs(x) * -h + y * s <= 0.0:
+            qx, qy, _, _ = features.section_foot(groove, features.ARC, x, y)
+            return qx, qy, features.ARC
+    elif side * x >= s:
+        return x, h, features.FLAT_N if side > 0.0 else features.FLAT_M
+    return side * s, h, features.LIP_N if side > 0.0 else features.LIP_M
 
 
 @formula
@@ -91,14 +98,19 @@ def plain_gap(groove: Groove, rod: Rod, best: Candidate) -> Gap:
 
 
 @formula
-def on_side_at(groove: Groove, rod: Rod, piece: int, t: float, best: Candidate) -> Candidate:
-    """The best so far, or the point of a side piece that is nearest to the axis point at t."""
+def on_piece_at(groove: Groove, rod: Rod, piece: int, t: float, best: Candidate) -> Candidate:
+    """The best so far, or the point of a piece that is nearest to the axis point at t."""
     p = features.axis_point(rod, t)
-    gap, x, y, feature = piece_section(groove, piece, p)
-    d2, z, end = gap * gap, p.z, abs(p.z) - groove.H
-    if end > 0.0:
-        d2, z, feature = d2 + end * end, math.copysign(groove.H, z), features.beyond_end(feature)
-    return Candidate(d2, t, feature, Vector(x, y, z)) if d2 < best.d2 else best
+    x, y, feature = section_foot_of(groove, piece, p.x, p.y)
+    z = min(max(p.z, -groove.H), groove.H)
+    if piece >= END_BELOW:
+        z = end_of(piece) * groove.H
+    elif z != p.z:
+        feature = features.beyond_end(feature)
+    q = Vector(x, y, z)
+    off = minus(p, q)
+    d2 = dot(off, off)
+    return Candidate(d2, t, feature, q) if d2 < best.d2 else best
 
 
 @formula
@@ -116,78 +128,57 @@ def on_back_of_arc(groove: Groove, rod: Rod, best: Candidate) -> Candidate:
 
 
 @formula
-def side_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
-    """Gap of the arc surface or of a flat face without regard to sign."""
-    H, half, z = groove.H, rod.half, rod.centre.z
-    best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
-    if is_parallel(groove, rod, half):  # one point in the middle of the stretch next to the groove, or the nearer end
-        lo, hi = max(z - half, -H), min(z + half, H)
-        along = 0.5 * (lo + hi) - z if lo <= hi else (-half if hi == H else half)
-        return plain_gap(groove, rod, on_side_at(groove, rod, piece, along * rod.axis.z, best))
-    best = on_side_at(groove, rod, piece, -half, best)
-    best = on_side_at(groove, rod, piece, half, best)
-    if piece == ARC_SURFACE:
-        best = on_back_of_arc(groove, rod, best)
+def on_edges(groove: Groove, rod: Rod, piece: int, best: Candidate) -> Candidate:
+    """The best so far, or the point of the edges and corners of a piece that is nearest to the axis' inside."""
+    is_flat, is_end = piece in (FACE_M, FACE_N), piece >= END_BELOW
     for k in range(2):
         side = -1.0 if k == 0 else 1.0
-        ez = side * H
-        if piece != (FACE_N if k == 0 else FACE_M):  # its own lip and corners
+        if not is_end and not (is_flat and side != side_of(piece, 0.0)):
             best = features.on_lip(groove, rod, side, best)
-            best, _ = features.on_corner(groove, rod, side, -H, best)
-            best, _ = features.on_corner(groove, rod, side, H, best)
-        if piece == ARC_SURFACE:
+        if is_end and side != end_of(piece):
+            continue
+        ez = side * groove.H
+        if not is_flat:
             best = features.on_end_arc(groove, rod, features.end_circle(groove, rod, ez), best)
-        else:
+        if piece != ARC_SURFACE:
             edge = features.on_end_edge(groove, rod, ez, best)
-            best = edge if edge.point.x * side_of(piece, 0.0) > 0.0 else best
+            best = edge if is_end or edge.point.x * side_of(piece, 0.0) > 0.0 else best
+        for j in range(2):
+            corner = -1.0 if j == 0 else 1.0
+            if not (is_flat and corner != side_of(piece, 0.0)):
+                best, _ = features.on_corner(groove, rod, corner, ez, best)
+    return best
+
+
+@formula
+def free_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
+    """Gap of a piece without regard to sign."""
+    H, half, z, dz = groove.H, rod.half, rod.centre.z, rod.axis.z
+    best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
+    if is_parallel(groove, rod, half):  # one point of the stretch next to the piece, or the nearer end
+        middle = 0.5 * (max(z - half, -H) + min(z + half, H))
+        t = ((end_of(piece) * H if piece >= END_BELOW else middle) - z) / dz
+        if abs(t) <= half:
+            best = on_piece_at(groove, rod, piece, t, best)
+    best = on_piece_at(groove, rod, piece, -half, best)
+    best = on_piece_at(groove, rod, piece, half, best)
+    if not is_parallel(groove, rod, half):
+        if piece == ARC_SURFACE:
+            best = on_back_of_arc(groove, rod, best)
+        best = on_edges(groove, rod, piece, best)
     return plain_gap(groove, rod, best)
 
 
 @formula
-def on_face_at(groove: Groove, rod: Rod, ez: float, t: float, best: Candidate) -> Candidate:
-    """The best so far, or the point of the end face z = ez that is nearest to the axis point at t."""
-    x, y, z = features.axis_point(rod, t)
+def end_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
+    """Gap of an end face: of one that the axis goes through by the way out, sideways or back along z."""
+    end, d = end_of(piece), rod.axis
+    reach = rod.half * abs(d.z)
+    front, back = end * rod.centre.z + reach - groove.H, groove.H - end * rod.centre.z + reach  # on either side of it
+    x, y, ez = features.axis_point(rod, (end * groove.H - rod.centre.z) / d.z)
     gap, feature = features.section(groove, x, y)
-    d2 = (z - ez) * (z - ez)
-    if gap <= 0.0:
-        feature = features.END_FACE
-    else:
-        x, y, _, _ = features.section_foot(groove, feature, x, y)
-        d2, feature = d2 + gap * gap, features.beyond_end(feature)
-    return Candidate(d2, t, feature, Vector(x, y, ez)) if d2 < best.d2 else best
-
-
-@formula
-def end_gap(groove: Groove, rod: Rod, end: float) -> Gap:
-    """Gap of the end face at the top (end = 1) or the bottom (-1)."""
-    ez, z, dz = end * groove.H, rod.centre.z, rod.axis.z
-    reach = rod.half * abs(dz)
-    front, back = end * z + reach - groove.H, groove.H - end * z + reach  # how far the axis is on either side
-    is_through = front > 0.0 and back > 0.0 and dz != 0.0
-    t = (ez - z) / dz
-    p = features.axis_point(rod, t)
-    if is_through and features.section(groove, p.x, p.y)[0] < 0.0:
-        return gap_through(groove, rod, end, front, back)
-    best = Candidate(math.inf, 0.0, features.END_FACE, rod.centre)
-    best = on_face_at(groove, rod, ez, -rod.half, best)
-    best = on_face_at(groove, rod, ez, rod.half, best)
-    if is_parallel(groove, rod, rod.half):
-        if is_through:
-            best = on_face_at(groove, rod, ez, t, best)
-    else:
-        best = features.on_end_edge(groove, rod, ez, best)
-        best, _ = features.on_corner(groove, rod, -1.0, ez, best)
-        best, _ = features.on_corner(groove, rod, 1.0, ez, best)
-        best = features.on_end_arc(groove, rod, features.end_circle(groove, rod, ez), best)
-    return plain_gap(groove, rod, best)
-
-
-@formula
-def gap_through(groove: Groove, rod: Rod, end: float, front: float, back: float) -> Gap:
-    """Gap of an end face that the axis goes through: by its way out, sideways or back along z."""
-    ez, d = end * groove.H, rod.axis
-    x, y, _ = features.axis_point(rod, (ez - rod.centre.z) / d.z)
-    gap, feature = features.section(groove, x, y)
+    if not (front > 0.0 and back > 0.0 and d.z != 0.0 and gap < 0.0):
+        return free_gap(groove, rod, piece)
     if min(front, back) < -gap:
         way = end if back < front else -end
         axis_end = features.axis_point(rod, math.copysign(rod.half, -d.z * way))
@@ -208,7 +199,8 @@ def gap_inside(groove: Groove, rod: Rod, piece: int, t: float, outer: Gap) -> Ga
         free, g = outer.distance + rod.r, outer.rate
         rate = Vector(factor * g.x + free * fx, factor * g.y + free * fy, factor * g.z)
         return Gap(factor * free - rod.r, outer.point, outer.normal, outer.feature, rate, outer.axis_point)
-    gap, qx, qy, feature = piece_section(groove, piece, p)
+    qx, qy, feature = section_foot_of(groove, piece, p.x, p.y)
+    gap = math.sqrt((p.x - qx) * (p.x - qx) + (p.y - qy) * (p.y - qy))
     a = plain_gap(groove, rod, Candidate(gap * gap, t, feature, Vector(qx, qy, p.z)))
     flip = -1.0 if p.x * p.x + p.y * p.y > groove.R * groove.R and gap > 1e-13 * groove.R else 1.0
     nx, ny = flip * a.normal.x, flip * a.normal.y
@@ -237,12 +229,9 @@ def pieces(T: Array, R: float, half_angle: float, H: float, r: float, half: floa
     groove, rod = features.groove_of(R, half_angle, H), rod_at(T, 0, r, half)
     t = place_inside(groove, rod)
     for piece in range(5):
-        if piece < 3:
-            gap = side_gap(groove, rod, piece)
-            if not math.isnan(t):
-                gap = gap_inside(groove, rod, piece, t, gap)
-        else:
-            gap = end_gap(groove, rod, -1.0 if piece == 3 else 1.0)
+        gap = end_gap(groove, rod, piece) if piece >= END_BELOW else free_gap(groove, rod, piece)
+        if piece < END_BELOW and not math.isnan(t):
+            gap = gap_inside(groove, rod, piece, t, gap)
         row = out[piece]
         row.distance, row.feature = gap.distance, gap.feature
         put(row.point_on_groove, gap.point)
