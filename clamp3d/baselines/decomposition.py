@@ -22,19 +22,24 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
+import time
 from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+import platformdirs
 from numpy.typing import ArrayLike
 
-from clamp3d.baselines import cache as disk
 from clamp3d.errors import InputError, SolverError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.geometry.mesh import Mesh, closed_mesh
+from clamp3d.geometry.pose import Array
 
-_RUN = "clamp3d.baselines.coacd_worker:run"
+_RUN = f"{__name__}:run_coacd"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +62,9 @@ class DecompositionParameters:
 
 @dataclass(frozen=True, slots=True)
 class Decomposition:
-    """Hulls of a mesh; ``seconds`` is the time CoACD took, also where ``cached`` says that this was before."""
+    """Corners (n, 3) of each hull, mm; ``seconds`` is CoACD's time, also where ``cached`` says that this was before."""
 
-    hulls: tuple[Mesh, ...]
+    hulls: tuple[Array, ...]
     seconds: float
     cached: bool
 
@@ -72,53 +77,66 @@ def decompose(
     name: str = "mesh",
     time_limit: float = 300.0,
     progress: bool | None = None,
-    cache: bool = True,
 ) -> Decomposition:
     """Convex hulls that together stand for a closed mesh (vertices (n, 3) mm, faces (m, 3) outward).
 
-    CoACD runs in a process of its own for at most ``time_limit`` s; nothing is left behind when it is interrupted.
-    ``progress`` on stderr: None shows it on a terminal. Answers are kept on disk (`clamp3d.baselines.cache`) unless
-    ``cache`` is false. Raises InputError for a mesh that is not closed (`closed_mesh`), SolverError if CoACD does not
-    finish in time or ends without an answer.
+    CoACD runs in a process of its own for at most ``time_limit`` s: it ends its process on input that it does not like
+    and cannot be stopped once it runs. ``progress`` on stderr: None shows it on a terminal. Answers are kept on disk
+    (`cache_dir`). Raises InputError for a mesh that is not closed (`closed_mesh`), SolverError if CoACD does not finish
+    in time or ends without an answer.
     """
     solid = closed_mesh(vertices, faces, name)
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
     settings = asdict(parameters or DecompositionParameters())
-    key = _cache_key(solid, settings)
-    if cache and (arrays := disk.load(key)) is not None:
-        with suppress(KeyError, TypeError, ValueError):
-            return Decomposition(_hulls(arrays), float(arrays["seconds"]), True)
+    kept = _cache_file(solid, settings)
+    with suppress(Exception):  # no file; a damaged one can raise anything
+        return _decomposition(dict(np.load(kept, allow_pickle=False)), True)
     try:
         with Worker() as worker, _status(name, progress):
             arrays = worker.call(_RUN, solid.vertices, solid.faces, settings, time_limit=time_limit)
-        result = Decomposition(_hulls(arrays), float(arrays["seconds"]), False)
     except WorkerTimeoutError:
         raise SolverError(
             f"CoACD did not finish {name} in {time_limit:g} s at threshold {settings['threshold']:g}; "
             "raise time_limit or threshold"
         ) from None
-    except (WorkerEndedError, RuntimeError, MemoryError, ValueError) as error:
+    except (WorkerEndedError, RuntimeError, MemoryError) as error:
         raise SolverError(f"CoACD gave no hulls for {name}: {error or 'out of memory'}") from None
-    if cache:
-        disk.keep(key, arrays)
-    return result
+    with suppress(OSError):  # a cache that cannot be written is no error
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        part = kept.with_suffix(f".{os.getpid()}.npz")
+        np.savez(part, allow_pickle=False, **arrays)
+        part.replace(kept)
+    return _decomposition(arrays, False)
 
 
-def _cache_key(solid: Mesh, settings: dict[str, Any]) -> str:
-    """The file's name in the cache, from everything that the hulls depend on."""
+def run_coacd(vertices: Array, faces: Any, parameters: dict[str, Any]) -> dict[str, Any]:
+    """CoACD itself, in the process: corners of all hulls one after the other, the ``counts`` of each, the seconds."""
+    import coacd
+
+    start = time.perf_counter()
+    hulls = [np.asarray(corners) for corners, _ in coacd.run_coacd(coacd.Mesh(vertices, faces), **parameters)]
+    hulls.sort(key=lambda corners: corners.tolist())  # CoACD 1.0.10 gives them in another order each time
+    counts = [len(corners) for corners in hulls]
+    return {"points": np.concatenate(hulls), "counts": counts, "seconds": time.perf_counter() - start}
+
+
+def _decomposition(arrays: dict[str, Any], cached: bool) -> Decomposition:
+    hulls = np.split(arrays["points"], np.cumsum(arrays["counts"])[:-1])
+    return Decomposition(tuple(hulls), float(arrays["seconds"]), cached)
+
+
+def cache_dir() -> Path:
+    """Folder of the cache: $CLAMP3D_CACHE, else the platform's place for caches ($XDG_CACHE_HOME/clamp3d on Linux)."""
+    own = os.environ.get("CLAMP3D_CACHE")
+    return Path(own).expanduser() if own else platformdirs.user_cache_path("clamp3d", appauthor=False)
+
+
+def _cache_file(solid: Mesh, settings: dict[str, Any]) -> Path:
+    """The file in the cache, named after everything that the hulls depend on."""
     mesh = solid.vertices.astype("<f8").tobytes() + solid.faces.astype("<i8").tobytes()
-    about = f"{metadata.version('coacd')} {len(solid.vertices)} {settings}".encode()
-    return f"decomposition-{hashlib.sha256(about + mesh).hexdigest()[:32]}"
-
-
-def _hulls(arrays: Any) -> tuple[Mesh, ...]:
-    count = int(arrays["count"])
-    if count < 1:
-        raise ValueError("no hulls")
-    # CoACD 1.0.10 gives the same hulls in another order each time.
-    result = sorted(((arrays[f"v{i}"], arrays[f"f{i}"]) for i in range(count)), key=lambda hull: hull[0].tolist())
-    return tuple(closed_mesh(vertices, faces, f"hull {i}") for i, (vertices, faces) in enumerate(result))
+    about = f"hulls {metadata.version('coacd')} {len(solid.vertices)} {settings}".encode()
+    return cache_dir() / f"decomposition-{hashlib.sha256(about + mesh).hexdigest()[:32]}.npz"
 
 
 def _status(name: str, progress: bool | None) -> Any:

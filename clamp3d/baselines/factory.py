@@ -10,7 +10,7 @@ from clamp3d.errors import InputError
 if TYPE_CHECKING:
     from clamp3d.baselines.decomposition import DecompositionParameters
     from clamp3d.baselines.model import ContactModel
-    from clamp3d.baselines.polytopes import PartOrMesh
+    from clamp3d.geometry.shapes import Solid
 
 METHODS: dict[str, tuple[str, ...]] = {
     "cas": (),
@@ -27,7 +27,7 @@ _CLASSES = {"cas": "Cas", "chords": "Chords", "wedges": "Wedges", "hulls": "Hull
 
 def contact_model(
     name: str,
-    parts: Mapping[str, PartOrMesh] | None = None,
+    parts: Mapping[str, Solid] | None = None,
     *,
     unit_angle: float | None = None,
     threshold: float | DecompositionParameters | None = None,
@@ -41,14 +41,14 @@ def contact_model(
     ----------
     name : {"cas", "chords", "wedges", "hulls", "mesh"}
         Exact arcs; chords in the section; convex wedges, CoACD's hulls or triangle meshes in 3D, measured by FCL.
-    parts : mapping of str to Solid or mesh, optional
+    parts : mapping of str to Solid, optional
         Grooved parts by name, in their own frames, mm, for wedges, hulls and mesh; cut or meshed when first measured.
     unit_angle : float, optional
         Largest angle of a chord in rad, for chords and wedges; 5 degrees by default.
     threshold : float or DecompositionParameters, optional
         Concavity in mm that CoACD may leave, for hulls; 2 mm by default.
     mesh_error : float, optional
-        Chord error in mm of the meshes made of solids, for hulls and mesh; 0.05 mm by default.
+        Chord error in mm of the meshes, for hulls and mesh; 0.05 mm by default.
     progress : bool, optional
         Whether CoACD's progress is shown on stderr; by default only on a terminal.
     time_limit : float

@@ -13,7 +13,7 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
   At a rim the depth is understated, as of a cylinder whose rims are rounded by c (1e-12 mm at least).
   Deeper than that it is only known to be at least c.
 - The normal from two witness points is worthless where they nearly meet. It is taken from the cylinder's own surface.
-- NaN, scaled poses, empty meshes and open "convex" shapes pass without a word or end the interpreter: refused here.
+- NaN, scaled poses, empty meshes and open "convex" shapes pass without a word or end the interpreter: none gets there.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from numpy.typing import ArrayLike
 
 from clamp3d.engine.surface import fcl_tree
 from clamp3d.errors import InputError
-from clamp3d.geometry.mesh import Mesh, closed_mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Cylinder
 
@@ -43,8 +42,6 @@ _EROSIONS = (0.4, 0.9)  # of the radius or half length
 _SHALLOWEST = 1e-12  # mm: what overlaps by a rim alone is this deep at least
 _RIM = 1e-6  # of the cylinder's size: a witness point this near the rim lies on it
 _WITNESS = 1e-3  # mm apart from which the witness points give a direction at a rim
-_CONVEX = 1e-9  # of the size
-
 
 Kind = Literal["convex", "mesh", "surface"]
 
@@ -63,43 +60,31 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A solid at the origin of its own frame, ready for FCL; ``bounds`` (2, 3) in mm. A surface need not be closed."""
+    """A solid at the origin of its own frame, ready for FCL; mm. A surface need not be closed."""
 
     kind: Kind
-    solid: Mesh
-    bounds: Array
+    solid: trimesh.Trimesh
     collision_object: Any
 
 
-def convex(vertices: ArrayLike, faces: ArrayLike, name: str = "convex shape") -> Shape:
-    """A convex polytope (`fcl.Convex`) from its triangles; InputError if it is open, inside out or not convex."""
-    solid = _solid(vertices, faces, name)
-    V, F = solid.vertices, solid.faces
-    corners = V[F]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1)
-    real = length > 0.0
-    height = ((V @ normals[real].T) - np.einsum("ij,ij->i", corners[real, 0], normals[real])) / length[real]
-    if height.max() > _CONVEX * np.ptp(V, axis=0).max():
-        raise InputError(f"{name} must be convex: a vertex stands {height.max():.3g} mm outside one of its faces")
-    return _shape("convex", solid, fcl.Convex(V * UNIT, len(F), np.insert(F, 0, 3, axis=1).ravel()))
+def convex(points: ArrayLike, name: str = "convex shape") -> Shape:
+    """The convex hull of points (n, 3) as `fcl.Convex`."""
+    hull = trimesh.convex.convex_hull(np.asarray(points))
+    faces = np.insert(hull.faces, 0, 3, axis=1).ravel()
+    return _shape("convex", hull, fcl.Convex(hull.vertices * UNIT, len(hull.faces), faces), name)
 
 
-def bvh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Shape:
-    """A closed triangle mesh (`fcl.BVHModel`); InputError if it is empty, open or inside out."""
-    return _tree("mesh", _solid(vertices, faces, name))
+def bvh(mesh: trimesh.Trimesh, name: str = "mesh") -> Shape:
+    """A closed triangle mesh (`fcl.BVHModel`)."""
+    return _shape("mesh", mesh, fcl_tree(mesh.vertices * UNIT, mesh.faces), name)
 
 
 def facets(mesh: Shape) -> list[Shape]:
     """Each flat face of a mesh as an open surface of its own: it has no inside, and nothing is contained in it."""
-    V, F = mesh.solid.vertices, mesh.solid.faces
-    flat = [np.asarray(group, dtype=np.int64) for group in trimesh.Trimesh(V, F, process=False).facets]
-    alone = np.setdiff1d(np.arange(len(F)), np.concatenate([*flat, np.empty(0, dtype=np.int64)]))
-    out = []
-    for group in (*flat, *alone[:, None]):
-        used, index = np.unique(F[group], return_inverse=True)
-        out.append(_tree("surface", Mesh("facet", V[used], index.reshape(-1, 3), False)))
-    return out
+    flat = list(mesh.solid.facets)
+    alone = np.setdiff1d(np.arange(len(mesh.solid.faces)), np.concatenate([*flat, np.empty(0, dtype=np.int64)]))
+    parts = mesh.solid.submesh([*flat, *alone[:, None]], repair=False)
+    return [Shape("surface", part, _placed(fcl_tree(part.vertices * UNIT, part.faces))) for part in parts]
 
 
 class Wire:
@@ -120,7 +105,7 @@ class Wire:
         cylinder = self.cylinder
         self.T = np.eye(4)
         shape = fcl.Cylinder(cylinder.radius * UNIT, cylinder.length * UNIT)
-        self.collision_object = fcl.CollisionObject(shape, transform(self.T))
+        self.collision_object = _placed(shape)
 
     def place(self, T_a_wire: Array) -> None:
         """Put the wire at a pose (4, 4) that has passed `check_pose` or `check_pose_array`."""
@@ -164,11 +149,9 @@ def measure(shape: Shape, wire: Wire) -> Measurement:
 
 def contained(shape: Shape, wire: Wire) -> bool:
     """Whether a wire that does not cross a mesh's surface lies inside it (its middle does)."""
-    if shape.kind != "mesh" or wire.cylinder.length > np.linalg.norm(shape.bounds[1] - shape.bounds[0]):
+    if shape.kind != "mesh" or wire.cylinder.length > shape.solid.scale:
         return False
     middle = wire.T[:3, 3]
-    if (middle < shape.bounds[0]).any() or (middle > shape.bounds[1]).any():
-        return False
     return bool(igl.winding_number(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
 
 
@@ -197,19 +180,13 @@ def _normal(d: float, on_a: Array, on_b: Array, wire: Wire) -> Array:
     return np.asarray(between / np.linalg.norm(between))
 
 
-def _shape(kind: Kind, solid: Mesh, geometry: Any) -> Shape:
-    bounds = np.array([solid.vertices.min(axis=0), solid.vertices.max(axis=0)])
-    return Shape(kind, solid, bounds, fcl.CollisionObject(geometry, transform(np.eye(4))))
+def _shape(kind: Kind, solid: trimesh.Trimesh, geometry: Any, name: str) -> Shape:
+    _check_size(f"{name}: largest extent", float(solid.extents.max()))
+    return Shape(kind, solid, _placed(geometry))
 
 
-def _tree(kind: Kind, solid: Mesh) -> Shape:
-    return _shape(kind, solid, fcl_tree(solid.vertices * UNIT, solid.faces))
-
-
-def _solid(vertices: ArrayLike, faces: ArrayLike, name: str) -> Mesh:
-    solid = closed_mesh(vertices, faces, name)
-    _check_size(f"{name}: largest extent", float(np.ptp(solid.vertices, axis=0).max()))
-    return solid
+def _placed(geometry: Any) -> Any:
+    return fcl.CollisionObject(geometry, transform(np.eye(4)))
 
 
 def _check_size(name: str, size: float) -> None:

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.fcl_shapes import convex
-from clamp3d.baselines.polytopes import PartOrMesh, PolytopeModel, Polytopes, part_mesh
+from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
+from clamp3d.geometry.meshing import mesh
+from clamp3d.geometry.shapes import Solid
 
 
 class Hulls(PolytopeModel):
@@ -18,12 +20,12 @@ class Hulls(PolytopeModel):
 
     Parameters
     ----------
-    parts : mapping of str to Solid or mesh
-        Grooved parts by name, mm. A solid is meshed when it is first measured; a mesh must be closed.
+    parts : mapping of str to Solid
+        Grooved parts by name, mm. A part is meshed when it is first measured.
     threshold : float or DecompositionParameters
         Concavity in mm that CoACD may leave, or CoACD's settings.
     mesh_error : float
-        Chord error in mm of the meshes made of solids.
+        Chord error in mm of the meshes.
     time_limit, progress
         See `decompose`.
     """
@@ -37,7 +39,7 @@ class Hulls(PolytopeModel):
 
     def __init__(
         self,
-        parts: Mapping[str, PartOrMesh],
+        parts: Mapping[str, Solid],
         threshold: float | DecompositionParameters = 2.0,
         *,
         mesh_error: float = 0.05,
@@ -51,26 +53,18 @@ class Hulls(PolytopeModel):
         self.mesh_error, self.time_limit, self.progress = mesh_error, time_limit, progress
         self.decompositions: dict[str, Decomposition] = {}
 
-    @property
-    def meshes_built(self) -> int:
-        """How many parts had to be meshed so far."""
-        return len(self.decompositions)
-
-    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+    def cut(self, name: str, part: Solid) -> Polytopes:
         """See `PolytopeModel`."""
-        from trimesh.convex import convex_hull
-
-        mesh = part_mesh(part, self.mesh_error)
+        made = mesh(part, self.mesh_error)
         self.decompositions[name] = decompose(
-            mesh.vertices,
-            mesh.faces,
+            made.vertices,
+            made.faces,
             self.parameters,
             name=name,
             time_limit=self.time_limit,
             progress=self.progress,
         )
-        # CoACD's own triangles can be dented by 1e-6 mm where they are nearly flat; Qhull's are not.
-        hulls = [convex_hull(hull.vertices) for hull in self.decompositions[name].hulls]
+        hulls = self.decompositions[name].hulls
         names = [f"hull {i + 1}" for i in range(len(hulls))]
-        shapes = [convex(hull.vertices, hull.faces, f"{name} {n}") for hull, n in zip(hulls, names, strict=True)]
+        shapes = [convex(corners, f"{name} {n}") for corners, n in zip(hulls, names, strict=True)]
         return Polytopes(shapes, names)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -11,23 +10,11 @@ from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, distance, facets, mea
 from clamp3d.baselines.model import Pieces, pose_of, poses_of
 from clamp3d.checks import instance
 from clamp3d.errors import InputError
+from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array, check_pose
 from clamp3d.geometry.primitives import Cylinder
 from clamp3d.geometry.shapes import Solid
 from clamp3d.kernel.contact_model import GroovePair
-
-
-class TriangleMesh(Protocol):
-    """Vertices (n, 3) mm and faces (m, 3): what `trimesh.Trimesh` and `geometry.mesh.Mesh` have."""
-
-    @property
-    def vertices(self) -> Any: ...  # noqa: D102
-
-    @property
-    def faces(self) -> Any: ...  # noqa: D102
-
-
-PartOrMesh = Solid | TriangleMesh
 
 
 class Polytopes:
@@ -40,8 +27,7 @@ class Polytopes:
     def __init__(self, shapes: Sequence[Shape], names: Sequence[str]) -> None:
         self.shapes = tuple(shapes)
         self.names = tuple(names)
-        self._low = np.array([shape.bounds[0] for shape in shapes])
-        self._high = np.array([shape.bounds[1] for shape in shapes])
+        self._low, self._high = np.array([shape.solid.bounds for shape in shapes]).swapaxes(0, 1)
 
     def pieces(self, wire: Wire, T_a_wire: Array) -> Pieces:
         """One gap per polytope, with the wire at a pose (4, 4) in the part's frame."""
@@ -81,11 +67,14 @@ class PolytopeModel:
 
     Parameters
     ----------
-    parts : mapping of str to Solid or mesh
+    parts : mapping of str to Solid
         Grooved parts by name, mm.
     """
 
-    def __init__(self, parts: Mapping[str, PartOrMesh]) -> None:
+    is_meshed = True
+    """Whether a part is meshed to be cut."""
+
+    def __init__(self, parts: Mapping[str, Solid]) -> None:
         instance("parts", parts, Mapping)
         self._parts = parts
         self._cut: dict[str, Polytopes] = {}
@@ -94,9 +83,9 @@ class PolytopeModel:
     @property
     def meshes_built(self) -> int:
         """How many parts had to be meshed so far."""
-        return 0
+        return len(self._cut) if self.is_meshed else 0
 
-    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+    def cut(self, name: str, part: Solid) -> Polytopes:
         """The polytopes of a part; each model has its own."""
         raise NotImplementedError
 
@@ -125,15 +114,6 @@ class PolytopeModel:
         return self._wires[cylinder]
 
 
-def part_mesh(part: PartOrMesh, mesh_error: float) -> TriangleMesh:
-    """The mesh of a part within ``mesh_error`` mm, or the mesh itself if it is one."""
-    if not isinstance(part, Solid):
-        return part
-    from clamp3d.geometry.meshing import mesh
-
-    return cast(TriangleMesh, mesh(part, mesh_error))
-
-
 class Meshes(PolytopeModel):
     """The parts' meshes as they are, measured by FCL; any pose.
 
@@ -143,29 +123,23 @@ class Meshes(PolytopeModel):
 
     Parameters
     ----------
-    parts : mapping of str to Solid or mesh
-        Grooved parts by name, mm. A solid is meshed when it is first measured; a mesh must be closed.
+    parts : mapping of str to Solid
+        Grooved parts by name, mm. A part is meshed when it is first measured.
     mesh_error : float
-        Chord error in mm of the meshes made of solids.
+        Chord error in mm of the meshes.
     """
 
     name = "mesh"
     limits = ("surface only", "no depth beyond 0.9 of the wire's radius", "groove too tight by the mesh's chord error")
 
-    def __init__(self, parts: Mapping[str, PartOrMesh], mesh_error: float = 0.05) -> None:
+    def __init__(self, parts: Mapping[str, Solid], mesh_error: float = 0.05) -> None:
         super().__init__(parts)
         self.mesh_error = mesh_error
         self._facets: dict[str, Polytopes] = {}
 
-    @property
-    def meshes_built(self) -> int:
-        """How many parts had to be meshed so far."""
-        return len(self._cut)
-
-    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
+    def cut(self, name: str, part: Solid) -> Polytopes:
         """See `PolytopeModel`."""
-        mesh = part_mesh(part, self.mesh_error)
-        return Polytopes([bvh(mesh.vertices, mesh.faces, name)], ["surface"])
+        return Polytopes([bvh(mesh(part, self.mesh_error), name)], ["surface"])
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps to every flat face of part a; see `ContactModel`."""

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.model import check_unit_angle
-from clamp3d.baselines.polytopes import PartOrMesh, PolytopeModel, Polytopes
+from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import Arc, Segment, chord_count
@@ -53,17 +52,18 @@ class Wedges(PolytopeModel):
 
     name = "wedges"
     limits = ("groove too tight by the chord error", "bolt hole filled", "depth of single wedges")
+    is_meshed = False
 
-    def __init__(self, parts: Mapping[str, PartOrMesh], unit_angle: float = math.radians(5.0)) -> None:
+    def __init__(self, parts: Mapping[str, Solid], unit_angle: float = math.radians(5.0)) -> None:
         super().__init__(parts)
         self.unit_angle = check_unit_angle(unit_angle)
 
-    def cut(self, name: str, part: PartOrMesh) -> Polytopes:
-        """See `PolytopeModel`. Raises InputError for a mesh, and as `part_wedges` does."""
-        if not isinstance(part, Solid):
-            raise InputError(f"part {name} must be a Solid to be cut into wedges, got {type(part).__name__}")
+    def cut(self, name: str, part: Solid) -> Polytopes:
+        """See `PolytopeModel`. Raises InputError as `part_wedges` does."""
         wedges = wedge_solids(part, self.unit_angle)
-        return Polytopes([convex(V, F, f"{name} {wedge}") for wedge, V, F in wedges], [wedge for wedge, _, _ in wedges])
+        return Polytopes(
+            [convex(corners, f"{name} {wedge}") for wedge, corners in wedges], [wedge for wedge, _ in wedges]
+        )
 
 
 def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
@@ -95,26 +95,19 @@ def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
     return out
 
 
-def prism(polygon: Array, start: float, end: float) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices (2k, 3) and outward triangles (4k - 4, 3) of a polygon (k, 2) drawn from z = start to end."""
-    from trimesh.creation import extrude_polygon
-
-    solid = extrude_polygon(shapely.Polygon(polygon), end - start)
-    return solid.vertices + np.array([0.0, 0.0, start]), np.asarray(solid.faces, dtype=np.int64)
+def prism(polygon: Array, start: float, end: float) -> Array:
+    """Corners (2k, 3) of a polygon (k, 2) drawn from z = start to end."""
+    return np.vstack([np.column_stack([polygon, np.full(len(polygon), z)]) for z in (start, end)])
 
 
-def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array, NDArray[np.int64]]]:
-    """Name of each wedge of a part, its vertices (n, 3) in the part's frame and outward triangles (m, 3).
-
-    Wedges of different cells may share a name.
-    """
+def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array]]:
+    """Name of each wedge of a part and its corners (n, 3) in the part's frame; wedges of two cells may share a name."""
     body = part.bodies[0]
-    prisms = [(w.name, *prism(w.polygon, body.start, body.end)) for w in part_wedges(part, unit_angle)]
-    return [(name, vertices @ body.frame.T, faces) for name, vertices, faces in prisms]
+    return [(w.name, prism(w.polygon, body.start, body.end) @ body.frame.T) for w in part_wedges(part, unit_angle)]
 
 
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
-    """The cell less the groove: a wedge behind each chord, and what lies beside the first and the last ray."""
+    """The cell less the groove: a wedge behind each chord, and what is left beside the first and the last ray."""
     m = chord_count(arc.sweep, unit_angle)
     angles = np.linspace(arc.end_angle, arc.start_angle, m + 1)
     centre = np.array(arc.centre)
@@ -122,19 +115,14 @@ def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
     size = float(shapely.hausdorff_distance(cell, shapely.Point(centre)))
     # The far side of each sector lies beyond the cell.
     chord, far = centre + arc.radius * ray, centre + 2.0 * size / math.cos(0.5 * -arc.sweep / m) * ray
-    sectors = {f"wedge {i + 1}": [chord[i], far[i], far[i + 1], chord[i + 1]] for i in range(m)}
-    if -arc.sweep < math.pi:  # else the rays leave the part at the mouth and nothing lies beside them
-        for name, k, sign in (("first side", 0, 1.0), ("last side", m, -1.0)):
-            along, beside = 2.0 * size * ray[k], 2.0 * size * sign * np.array([ray[k, 1], -ray[k, 0]])
-            ends = [centre - along, centre + along]
-            sectors[name] = [*ends, ends[1] + beside, ends[0] + beside]
-    common = {
-        name: shapely.remove_repeated_points(shapely.intersection(cell, shapely.Polygon(corners)), _SAME)
-        for name, corners in sectors.items()
-    }
+    sectors = [shapely.Polygon([chord[i], far[i], far[i + 1], chord[i + 1]]) for i in range(m)]
+    hollow = shapely.Polygon(chord) if m > 1 else shapely.Polygon()
+    sides = shapely.difference(cell, shapely.union_all([hollow, *sectors]))
+    pieces = [(f"wedge {i + 1}", shapely.intersection(cell, sector)) for i, sector in enumerate(sectors)]
+    pieces += [("side", polygon) for polygon in getattr(sides, "geoms", [sides])]
     return [
-        Wedge(name, np.asarray(orient(polygon).exterior.coords)[:-1])
-        for name, polygon in common.items()
+        Wedge(name, np.asarray(orient(shapely.remove_repeated_points(polygon, _SAME)).exterior.coords)[:-1])
+        for name, polygon in pieces
         if isinstance(polygon, shapely.Polygon) and polygon.area > _SLIVER
     ]
 

@@ -31,8 +31,7 @@ GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
 BLOCK = grooved_block(GROOVE, width=137.0, depth=30.0)
 MESH_ERROR = 0.0457
-BLOCK_MESH = mesh(BLOCK, MESH_ERROR)
-CHORD = BLOCK_MESH.metadata["chord_error"]
+CHORD = mesh(BLOCK, MESH_ERROR).metadata["chord_error"]
 
 
 def _poses(n: int, tilt: float, seed: int = 0) -> Array:
@@ -85,7 +84,7 @@ def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
 def test_mesh_is_too_tight_by_its_chord_error_at_most() -> None:
     poses = _poses(120, 0.02, seed=1)
     exact = Cas().distances(PAIR, poses)
-    model = Meshes({"P1": BLOCK_MESH})
+    model = Meshes({"P1": BLOCK}, MESH_ERROR)
     found = model.distances(PAIR, poses)
     apart = exact > CHORD
     error = (found - exact)[apart]
@@ -108,7 +107,7 @@ def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
     T = inverse(pair.T_a_groove)
     free = np.inf
     for hull in decomposition.hulls:
-        seen = (hull.vertices @ T[:3, :3].T + T[:3, 3])[:, :2]
+        seen = (hull @ T[:3, :3].T + T[:3, 3])[:, :2]
         outline = seen[ConvexHull(seen).vertices]
         along = np.roll(outline, -1, axis=0) - outline
         t = np.clip(-(outline * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
@@ -123,7 +122,7 @@ def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(
 ) -> None:
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
     settings = DecompositionParameters(threshold=0.05, real_metric=False)
-    model = Hulls({"P1": mesh(BLOCK, 0.5)}, settings)
+    model = Hulls({"P1": BLOCK}, settings, mesh_error=0.5)
     poses = _poses(100, 0.0, seed=2)
     exact = Cas().distances(PAIR, poses)
     error = (model.distances(PAIR, poses) - exact)[exact > 0.0]
@@ -131,7 +130,7 @@ def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(
     assert -filled - 1e-6 < error.min() < -0.1
     assert error.max() < 0.01
     _check_pieces(model, poses[:4])
-    again = Hulls({"P1": mesh(BLOCK, 0.5)}, settings)
+    again = Hulls({"P1": BLOCK}, settings, mesh_error=0.5)
     again.polytopes("P1")
     assert again.decompositions["P1"].cached
 
@@ -149,7 +148,7 @@ def test_reference_clamp_in_3d_is_its_section(key: tuple[str, str]) -> None:
     found = Wedges(parts(clamp), unit).distances(pair, poses)
     assert np.abs(found - expected)[shallow].max() < 1e-6
     chord = 0.005
-    surface = Meshes({pair.a: mesh(parts(clamp)[pair.a], chord)}).distances(pair, poses)
+    surface = Meshes(parts(clamp), chord).distances(pair, poses)
     exact = Cas().distances(pair, poses)
     apart = exact > chord
     assert (surface - exact)[apart].max(initial=-1.0) < 1e-6
@@ -160,7 +159,7 @@ def test_unknown_part_and_bad_pose_are_refused() -> None:
     model = Wedges({"P2": BLOCK}, 0.2)
     with pytest.raises(InputError, match="unknown part 'P1'; available: P2"):
         model.distances(PAIR, np.eye(4)[None])
-    for checked in (Wedges({"P1": BLOCK}, 0.2), Meshes({"P1": BLOCK_MESH})):
+    for checked in (Wedges({"P1": BLOCK}, 0.2), Meshes({"P1": BLOCK}, MESH_ERROR)):
         with pytest.raises(InputError, match="must be finite"):
             checked.pieces(PAIR, np.full((4, 4), np.nan))
         with pytest.raises(InputError, match="must be finite"):

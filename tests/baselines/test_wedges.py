@@ -63,7 +63,7 @@ def test_clamp_parts_are_filled_once(name: str, unit_deg: float) -> None:
     wedges = part_wedges(part, unit)
     assert_filled_once(wedges, shapely.Polygon(corners))
     for wedge in wedges:
-        convex(*prism(wedge.polygon, -30.0, 30.0))  # closed, outward, convex, or InputError
+        assert len(convex(prism(wedge.polygon, -30.0, 30.0)).solid.vertices) == 2 * len(wedge.polygon)
 
 
 def test_unit_angle_and_part_are_checked() -> None:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from clamp3d.baselines import ContactModel, contact_model
 from clamp3d.baselines.chords import chord_error
-from clamp3d.baselines.polytopes import PartOrMesh
 from clamp3d.bench.stress.family import Family, Methods
 from clamp3d.bench.stress.poses import features, magnitudes
 from clamp3d.bench.stress.poses.cases import Cases
@@ -97,7 +96,7 @@ class SolidMethod:
 
 
 def fcl_model(
-    name: str, part: PartOrMesh, groove: SweptArc, settings: Mapping[str, float], time_limit: float = 60.0
+    name: str, part: Solid, groove: SweptArc, settings: Mapping[str, float], time_limit: float = 60.0
 ) -> ContactModel:
     """The model of a part; ``settings`` but the angle in parts of the groove's radius."""
     sizes = {key: value * (1.0 if key == "unit_angle" else groove.radius) for key, value in settings.items()}
