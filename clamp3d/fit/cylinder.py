@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import fdtri
 
@@ -155,18 +154,3 @@ def surface_error(C: Array, half_angle: float, length: float, freedom: int) -> f
     g = np.column_stack([np.ones_like(a), np.sin(a), -np.cos(a), z * np.sin(a), -z * np.cos(a)])
     worst = float(np.einsum("ij,jk,ik->i", g, C, g).max())
     return float(np.sqrt(5.0 / fdtri(max(freedom, 1), 5, 1.0 - CONFIDENCE) * worst))  # F is the inverse of 1 / F
-
-
-def patches_of(local: Array) -> list[NDArray[np.intp]]:
-    """Points ``local`` (n, 3) of a cylinder's own frame in patches of 25 to 49, by halving along the longer side."""
-    angle = np.arctan2(local[:, 0], -local[:, 1])
-    flat = np.column_stack([angle * np.hypot(local[:, 0], local[:, 1]).mean(), local[:, 2]])
-
-    def halved(index: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-        if len(index) < 50:
-            return [index]
-        part = flat[index]
-        index = index[np.argsort(part[:, int(np.argmax(np.ptp(part, axis=0)))], kind="stable")]
-        return [*halved(index[: len(index) // 2]), *halved(index[len(index) // 2 :])]
-
-    return halved(np.arange(len(local)))

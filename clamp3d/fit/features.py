@@ -25,8 +25,8 @@ class FittedSurface:
     The errors, all in mm and all normal to the surface, over the covered faces:
 
     - ``covariance_error``: what the scatter of the vertices leaves open, over the whole arc at once (99.73 %).
-    - ``form_error``: how far the vertices lie off the cylinder in the mean over small patches, that is what does not
-      look like scatter: the part is not quite round, or the exporter rounded.
+    - ``form_error``: how far a vertex lies off the cylinder at most: the part is not quite round, the scanner scatters,
+      or the exporter rounded.
     - ``chord_error``: the largest sagitta of the facets, what the mesh does not tell between its vertices.
 
     ``fit_error`` = the first two: the bound if the part is round and the vertices lie on it (what tessellation means).

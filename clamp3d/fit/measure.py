@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, patches_of, perpendicular, surface_error
+from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, perpendicular, surface_error
 from clamp3d.fit.grow import Region
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 from clamp3d.geometry.mesh import IntArray
@@ -93,11 +93,13 @@ def _errors(
     (half, length), R = extent, T[:3, :3]
     points = (surface.V[region.points] - T[:3, 3]) @ R
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
-    ridges = _off_ridges(surface, region) if region.strips else 0.0
+    worst = float(np.abs(residual).max())
+    if region.strips:
+        worst = max(worst, _off_ridges(surface, region))
     freedom = max(len(points) - 5, 1)
     rms = float(np.sqrt((residual @ residual) / freedom))
     noise = float(np.hypot(rms, surface.mesh.rounding))
-    C = covariance(points, axis.radius, noise * _inflation(surface, region, residual))
+    C = covariance(points, axis.radius, noise)
     if C is None:
         return None
     area = float(surface.areas[region.faces].sum())
@@ -114,7 +116,7 @@ def _errors(
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
         "covariance": C * (stdtrit(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),
-        "form_error": max(_form_error(points, residual, rms), ridges) + 2.0 * surface.mesh.rounding,
+        "form_error": worst + 2.0 * surface.mesh.rounding,
         "chord_error": sagitta(axis.radius, region.span),
         "faces": surface.rows[region.faces],
     }
@@ -132,24 +134,6 @@ def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
     return 2.0 * math.asin(min(0.5 * np.median(chord), 1.0))
 
 
-def _inflation(surface: Surface, region: Region, residual: Array) -> float:
-    """Factor on the standard errors for residuals that neighbours share (a scanner's or a smoother's traces).
-
-    With correlation c between neighbours (first order autoregression along both directions of the surface) n points
-    are worth n ((1 - c) / (1 + c))^2 independent ones.
-    """
-    number = np.full(len(surface.V), -1)
-    number[region.points] = np.arange(len(region.points))
-    F = surface.F[region.faces]
-    i, j = number[np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)].T
-    both = (i >= 0) & (j >= 0)
-    power = float(residual @ residual) / len(residual)
-    if both.sum() < 30 or power <= 0.0:
-        return 1.0
-    c = min(float(np.mean(residual[i[both]] * residual[j[both]])) / power, 0.95)
-    return 1.0 if c < 3.0 / np.sqrt(both.sum()) else (1.0 + c) / (1.0 - c)
-
-
 def _off_ridges(surface: Surface, region: Region) -> float:
     """How far (mm) the lines between the strips are at most off the surface: what lies on chords is within a strip.
 
@@ -158,15 +142,3 @@ def _off_ridges(surface: Surface, region: Region) -> float:
     within = border(surface, region.faces)[2] & (surface.step > surface.floor)
     ends = surface.V[np.unique(surface.edges[within])]
     return float(np.abs(region.axis.residual(ends)).max(initial=0.0))
-
-
-def _form_error(points: Array, residual: Array, rms: float) -> float:
-    """Largest mean residual of a patch, with three standard errors of a mean; few points: the largest of all.
-
-    Scatter averages out over a patch, a surface that is not round does not.
-    """
-    worst = float(np.abs(residual).max())
-    patches = patches_of(points)
-    if len(patches) < 2:
-        return worst
-    return min(worst, max(abs(float(residual[i].mean())) + 3.0 * rms / float(np.sqrt(len(i))) for i in patches))
