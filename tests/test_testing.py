@@ -7,27 +7,20 @@ import numpy as np
 import pytest
 
 from clamp3d import distance, first_contact, min_clearance, shapes
-from clamp3d.baselines.wedges import wedge_solids
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.answer import Distance
-from clamp3d.fit.fit import fit_mesh
 from clamp3d.geometry.meshing import chord_error
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
-from clamp3d.geometry.profile import sagitta
 from clamp3d.testing import (
     Body,
     assert_distance,
-    assert_fit,
     assert_lower_on_way,
     assert_motion,
-    assert_pieces,
-    assert_returns,
     body,
     common,
-    convex_body,
     separation,
 )
 from tests.kinds import BLOCK, DRAWN, faceted_shape
@@ -139,24 +132,3 @@ def test_wrong_motions_are_seen():
         assert_motion(replace(hit, t=0.9), BOX, pin, way, start, first=True)
     with pytest.raises(AssertionError, match="at pose 1"):
         assert_lower_on_way(5.0, BOX, BALL, [translation(20, 0, 0), translation(9, 0, 0)])
-
-
-def test_wrong_fits_pieces_and_equilibria_are_seen():
-    (groove,) = fit_mesh(faceted_shape(BLOCK, 0.05).mesh).grooves
-    turn = np.linspace(-0.9, 0.9, 50)
-    on = np.column_stack([7.0 * np.sin(turn), -7.0 * np.cos(turn), 0.0 * turn])
-    assert_fit(groove, on)
-    with pytest.raises(AssertionError, match=r"mm off, stated"):
-        assert_fit(groove, on * (1.0 + 0.1))
-    splint, unit = parts(load_clamp())["P1"], math.radians(10.0)
-    plain = replace(splint, holes=())
-    pieces = [convex_body(V) for _, V, _ in wedge_solids(splint, unit)]
-    out = sagitta(splint.bodies[0].profile.arcs[0].radius, unit)
-    assert_pieces(plain, pieces, outside=out)
-    with pytest.raises(AssertionError, match="is in the body and in no piece"):
-        assert_pieces(plain, pieces[1:], outside=out)
-    with pytest.raises(AssertionError, match="stands out by"):
-        assert_pieces(plain, pieces, outside=0.5 * out)
-    assert_returns(np.round, np.zeros(2), [np.full(2, 0.1), np.full(2, -0.4)], 1e-9)
-    with pytest.raises(AssertionError, match=r"it ends 1\.0 away"):
-        assert_returns(np.round, np.zeros(2), [np.full(2, 0.6)], 1e-9)

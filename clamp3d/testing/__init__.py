@@ -11,17 +11,8 @@ the oracle proves it broken; what the oracle cannot decide passes.
 >>> assert_distance(distance(box, wire, T), box, wire, T)
 """
 
-from clamp3d.testing.assertions import (
-    assert_distance,
-    assert_fit,
-    assert_lower_on_way,
-    assert_motion,
-    assert_pieces,
-    assert_returns,
-    directions,
-    pose_at,
-)
-from clamp3d.testing.bodies import Body, Field, body, convex_body
+from clamp3d.testing.assertions import assert_distance, assert_lower_on_way, assert_motion, directions, pose_at
+from clamp3d.testing.bodies import Body, Field, body
 from clamp3d.testing.search import Common, common, separation
 
 __all__ = [
@@ -29,14 +20,10 @@ __all__ = [
     "Common",
     "Field",
     "assert_distance",
-    "assert_fit",
     "assert_lower_on_way",
     "assert_motion",
-    "assert_pieces",
-    "assert_returns",
     "body",
     "common",
-    "convex_body",
     "directions",
     "pose_at",
     "separation",

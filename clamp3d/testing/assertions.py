@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.motions import MotionDistance
-from clamp3d.fit.features import FittedSurface
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array
 from clamp3d.testing.bodies import AnyBody, Body, body
@@ -62,7 +61,7 @@ def assert_distance(
             assert out <= tolerance, f"point on {name} is {out:.3g} mm outside"
         if answer.upper >= 0.0:
             assert np.linalg.norm(q - p) <= answer.upper + tolerance, "the points are further apart than upper"
-    shared = _shared(x, y, cells)
+    shared = common(x, y, accuracy=0.005, cells=cells)
     truth = nearest(x, y, shared)
     if truth.upper > 0.0:
         assert answer.lower <= truth.upper + tolerance, f"lower {answer.lower} > attained {truth.upper}"
@@ -82,11 +81,6 @@ def assert_distance(
         assert closed >= -0.5 * tolerance, f"moved by {-answer.lower} along the normal they overlap by {-2.0 * closed}"
 
 
-def _shared(x: Body, y: Body, cells: int) -> Common:
-    """The search of `separation`."""
-    return common(x, y, accuracy=0.005, cells=cells)
-
-
 def _deepest(x: Body, y: Body, answer: Common, cells: int) -> float:
     """The least field found in both: where a search has not ended a coarser one, which comes further, looks again."""
     return answer.upper if answer.ended else min(answer.upper, common(x, y, cells=cells).upper)
@@ -99,15 +93,13 @@ def _moved(it: Body, by: Array) -> Body:
 
 
 def pose_at(motion: Motion, t: float, start: Array) -> Array:
-    """Pose (4, 4) at time t of a body that stands at ``start`` (4, 4): the exponential of the motion's twist."""
-    from scipy.linalg import expm
+    """Pose (4, 4) at time t of a body that stands at ``start`` (4, 4): by SciPy's rotation."""
+    from scipy.spatial.transform import Rotation
 
-    u = motion.angle * motion.axis
-    twist = np.zeros((4, 4))
-    twist[:3, :3] = [[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]]
-    turn = expm(t * twist)
-    T = np.asarray(turn @ start)
-    T[:3, 3] += motion.point - turn[:3, :3] @ motion.point + t * motion.travel
+    turn = Rotation.from_rotvec(t * motion.angle * motion.axis).as_matrix()
+    T = np.eye(4)
+    T[:3, :3] = turn @ start[:3, :3]
+    T[:3, 3] = motion.point + turn @ (start[:3, 3] - motion.point) + t * motion.travel
     return T
 
 
@@ -120,7 +112,7 @@ def assert_lower_on_way(
     x, y = body(a), body(b)
     for k, T in enumerate(poses):
         placed = y.at(T)
-        shared = _shared(x, placed, cells)
+        shared = common(x, placed, accuracy=0.005, cells=cells)
         apart = nearest(x, placed, shared).upper
         value = apart if apart > 0.0 else 2.0 * _deepest(x, placed, shared, cells)
         assert lower <= value + tolerance, f"lower {lower} on the way, but {value} at pose {k}"
@@ -162,34 +154,3 @@ def assert_motion(
         assert answer.touches or answer.distance.upper > -tolerance, f"touches nowhere, at {answer.distance.upper} mm"
         assert_lower_on_way(answer.distance.lower, a, b, poses, tolerance=tolerance, cells=cells)
         assert_distance(replace(answer.distance, lower=-math.inf), a, b, answer.pose, tolerance=tolerance, cells=cells)
-
-
-def assert_fit(feature: FittedSurface, points: Array, *, assumed_round: bool = False) -> None:
-    """Points (n, 3) of the true surface, between the feature's ends, lie within its stated error of the fitted one."""
-    local = (points - feature.T_part_feature[:3, 3]) @ feature.T_part_feature[:3, :3]
-    off = float(np.abs(np.hypot(local[:, 0], local[:, 1]) - feature.radius).max())
-    error = feature.fit_error if assumed_round else feature.error_bound
-    assert off <= error + 1e-12 * feature.radius, f"{feature.name}: {off} mm off, stated {error} mm"
-
-
-def assert_pieces(whole: AnyBody, pieces: Iterable[AnyBody], *, outside: float, count: int = 20_000) -> None:
-    """The pieces of a decomposition cover the body and stand out by ``outside`` mm at most, at ``count`` points."""
-    it, parts = body(whole), [body(piece) for piece in pieces]
-    low, high = np.min([p.box[0] for p in [it, *parts]], axis=0), np.max([p.box[1] for p in [it, *parts]], axis=0)
-    from scipy.stats import qmc
-
-    x = qmc.scale(qmc.Halton(3, seed=0).random(count), low, high)
-    own, covered = it.field(x), np.min([p.field(x) for p in parts], axis=0)
-    missing = (own < 0.0) & (covered > 1e-9)
-    assert not missing.any(), f"{x[missing][0]} is in the body and in no piece"
-    out = float(np.max(own, where=covered < 0.0, initial=-math.inf))
-    assert out <= outside + 1e-9, f"a piece stands out by {out} mm"
-
-
-def assert_returns(
-    solve: Callable[[Array], Array], state: Array, neighbours: Iterable[Array], tolerance: float
-) -> None:
-    """An equilibrium solved again from its ``neighbours`` is the same to ``tolerance``; ``solve(start)`` -> state."""
-    for start in neighbours:
-        off = float(np.abs(solve(start) - state).max())
-        assert off <= tolerance, f"from {start} it ends {off} away"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
@@ -65,15 +65,6 @@ def body(shape: AnyBody) -> Body:
     raise InputError(
         f"shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got {type(shape).__name__}"
     )
-
-
-def convex_body(vertices: ArrayLike) -> Body:
-    """The convex hull of points (n, 3), mm."""
-    from scipy.spatial import ConvexHull
-
-    V = np.asarray(vertices, dtype=np.float64)
-    planes = ConvexHull(V).equations
-    return Body(lambda x: (x @ planes[:, :3].T + planes[:, 3]).max(axis=1), np.array([V.min(axis=0), V.max(axis=0)]))
 
 
 def _prism(across: Array, along: Array) -> Array:
