@@ -84,6 +84,7 @@ def facets(mesh: Shape) -> list[Shape]:
     flat = list(mesh.solid.facets)
     alone = np.setdiff1d(np.arange(len(mesh.solid.faces)), np.concatenate([*flat, np.empty(0, dtype=np.int64)]))
     parts = mesh.solid.submesh([*flat, *alone[:, None]], repair=False)
+    assert isinstance(parts, list)  # as one mesh only with append=True
     return [Shape("surface", part, _placed(fcl_tree(part.vertices * UNIT, part.faces))) for part in parts]
 
 

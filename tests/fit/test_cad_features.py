@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("OCP")
-sys.path.insert(0, str(Path(__file__).parents[1] / "brep"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "files"))
 
 from assemblies import box, cone, cut, fuse, ring, rod, shift, solid_of, write_step
 
