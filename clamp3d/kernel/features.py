@@ -237,60 +237,33 @@ def on_corner(groove: Groove, rod: Rod, side: float, ez: float, best: Candidate)
 
 
 @inlined
-def nearer_start(k: float, a: float, q: float) -> tuple[float, float]:
-    """Lower bound of the root of ``nearer_root``, and its expansion in k to the second order, exact for small tilt."""
-    n2 = a * a + q * q
-    n = math.sqrt(n2)
-    over = 1.0 / n2
-    bend = k * (a * a * over)
-    low = max(q, n - k)
-    return low, max(low, n - bend + 1.5 * k * bend * (q * q * over) * (n * over))
+def inverse_root(g: float) -> float:
+    """``1 / sqrt(g)``, near 1 by its series, whose next term is below the rounding: without waiting for a root."""
+    return 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
 
 
 @inlined
-def nearer_root(k: float, a: float, q: float) -> float:
-    """Root mu > 0 of (a / (k + mu))^2 + (q / mu)^2 = 1, for k, a >= 0 and q > 0 (or a > k).
+def multiplier(k: float, a: float, q: float, start: float, least: float) -> float:
+    """Root mu of (a / (k + mu))^2 + (q / mu)^2 = 1, from ``start`` on its side of 0, at least ``least``; NaN if none.
 
-    1 / norm of the left side is concave in mu (a power mean of linear functions): Newton's method on it is below the
-    root after one step, climbs to it without passing it, and converges quadratically [Moré & Sorensen 1983].
+    1 / norm of the left side is concave in mu (a power mean of linear functions): for mu > 0 Newton's method on it is
+    below the root after one step, climbs to it without passing it, and converges quadratically [Moré & Sorensen 1983].
+    For mu < 0 it has a maximum, beyond which there is no root.
     """
-    low, mu = nearer_start(k, a, q)
-    for _ in range(40):
+    mu = start
+    for _ in range(60):
         over = 1.0 / ((k + mu) * mu)
         u, v = mu * over, (k + mu) * over
         x2, y2 = (a * u) * (a * u), (q * v) * (q * v)
-        g = x2 + y2
-        step = (math.sqrt(g) - 1.0) * g / (x2 * u + y2 * v)
-        mu = max(low, mu + step)
+        g, slope = x2 + y2, x2 * u + y2 * v
+        step = (math.sqrt(g) - 1.0) * g / slope
+        mu = max(least, mu + step)
+        if slope * start <= 0.0 or mu <= -k:
+            return math.nan
         # What is left is at most 3/8 k^2 step^2 / (mu^2 (k + mu)): without k the left side's root is linear.
-        if abs(step) * min(k, mu) <= CONVERGED * mu * mu:
+        if abs(step) * min(k, abs(mu)) <= CONVERGED * mu * mu:
             break
     return mu
-
-
-@formula
-def farther_root(k: float, a: float, q: float) -> float:
-    """Smaller root 0 < nu < k of (a / (k - nu))^2 + (q / nu)^2 = 1, for q > 0; -1 if there is none.
-
-    Concave like ``nearer_root``, but with a maximum: a slope that is not positive means that there is no root.
-    """
-    if a >= k or q >= k:
-        return -1.0
-    nu = q
-    for _ in range(60):
-        x = a / (k - nu)
-        y = q / nu
-        g = x * x + y * y
-        slope = y * y / nu - x * x / (k - nu)
-        if slope <= 0.0:
-            return -1.0
-        step = (math.sqrt(g) - 1.0) * g / slope
-        nu += step
-        if nu >= k:
-            return -1.0
-        if step <= CONVERGED * nu:
-            break
-    return nu
 
 
 @inlined
@@ -307,16 +280,14 @@ def stationary(k: float, a: float, q: float, is_nearest: bool) -> tuple[float, f
         S = math.sqrt(max(0.0, 1.0 - C * C))
         return C, S if is_nearest else -S
     if is_nearest:
-        mu = nearer_root(k, abs(a), abs(q))
+        low = max(abs(q), math.sqrt(a * a + q * q) - k)
+        mu = multiplier(k, a, q, low, low)
     else:
-        mu = -farther_root(k, abs(a), abs(q))
-        if mu >= 0.0:
-            return math.nan, 0.0
+        mu = multiplier(k, a, q, -abs(q), -k) if max(abs(a), abs(q)) < k else math.nan
     both = 1.0 / ((k + mu) * mu)
     C, S = a * (mu * both), q * ((k + mu) * both)
     g = C * C + S * S
-    # At g near 1 the root by its series, whose next term is below the rounding: without waiting for a root.
-    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)
+    n = inverse_root(g)
     return C * n, S * n
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from clamp3d.geometry.pose import RIGID_TOLERANCE, Array
 from clamp3d.geometry.primitives import LARGEST
-from clamp3d.kernel.features import Rod
+from clamp3d.kernel.features import Rod, inverse_root
 from clamp3d.kernel.jit import inlined
 from clamp3d.kernel.vector import Vector, cross, dot, times
 
@@ -48,7 +46,5 @@ def rigid(T: Array, k: int) -> bool:
 def rod_at(T: Array, k: int, r: float, half: float) -> Rod:
     """The cylinder of this radius and half length at the valid pose k: its axis as given, normalised."""
     centre, axis = place(T, k)
-    g = dot(axis, axis)
-    n = 1.5 - 0.5 * g if abs(g - 1.0) <= 1e-8 else 1.0 / math.sqrt(g)  # by its series near 1: no root to wait for
-    d = times(n, axis)
+    d = times(inverse_root(dot(axis, axis)), axis)
     return Rod(centre, d, d.x * d.x + d.y * d.y, r, half)
