@@ -95,16 +95,13 @@ def bodies_of(roots: Iterable[Node]) -> Reading:
                 {k: node.colours[of] for k, of in enumerate(map(Key, explore(solid, "FACE"))) if of in node.colours},
             )
             collector.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place, own)
-        surfaces = sum(1 for _ in explore(node.shape, "SHELL", "SOLID"))
-        surfaces += sum(1 for _ in explore(node.shape, "FACE", "SHELL"))
+        surfaces = [*explore(node.shape, "SHELL", "SOLID"), *explore(node.shape, "FACE", "SHELL")]
         if surfaces:
-            reason = f"{'a surface' if surfaces == 1 else f'{surfaces} surfaces'}, not a solid"
-            collector.add(node.name, reason, component.T)
+            collector.add(node.name, "a surface, not a solid", component.T)
         elif not solids:
             loose += 1
     if loose:
-        holders = "1 product holds" if loose == 1 else f"{loose} products hold"
-        collector.notes.append(f"{holders} curves or points only: left out")
+        collector.notes.append(f"products that hold curves or points only are left out: {loose}")
     return collector.reading()
 
 

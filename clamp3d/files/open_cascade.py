@@ -103,9 +103,14 @@ def bounds_at(brep: bytes, T: Array) -> Array:
 
 def moved(shape: Any, T: Array) -> Any:
     """A TopoDS_Shape placed by ``T`` (4, 4)."""
+    return shape.Moved(location(T))
+
+
+def location(T: Array) -> Any:
+    """A pose (4, 4) in mm as a TopLoc_Location."""
     from OCP.gp import gp_Trsf
     from OCP.TopLoc import TopLoc_Location
 
     place = gp_Trsf()
     place.SetValues(*np.asarray(T)[:3].ravel().tolist())
-    return shape.Moved(TopLoc_Location(place))
+    return TopLoc_Location(place)

@@ -24,15 +24,9 @@ from clamp3d.files.open_cascade import explore, require_open_cascade
 from clamp3d.files.part21 import Announced, announced
 from clamp3d.files.worker import OUTSIDE, may_read
 
-_OTHERS = {
-    "CSG_SOLID": "solids of constructive geometry",
-    "EXTRUDED_AREA_SOLID": "swept solids",
-    "REVOLVED_AREA_SOLID": "swept solids",
-    "SWEPT_FACE_SOLID": "swept solids",
-    "SOLID_REPLICA": "copied solids",
-    "TESSELLATED_SOLID": "tessellated solids",
-    "TESSELLATED_SHELL": "tessellated shells",
-}
+_OTHERS = re.compile(
+    "CSG_SOLID|(EXTRUDED|REVOLVED)_AREA_SOLID|SWEPT_FACE_SOLID|SOLID_REPLICA|TESSELLATED_(SOLID|SHELL)"
+)
 """Bodies that Open CASCADE does not make into solids."""
 _FAULT = re.compile("Parsing|Unresolved|SEVERAL TIMES")
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
@@ -180,9 +174,9 @@ def _lost(document: Any, contents: Iterable[Announced]) -> Iterator[str]:
     for content in contents:
         yield from content.orphans
         counts += content.counts
-    for kind, words in _OTHERS.items():
-        if counts[kind]:
-            yield f"{counts[kind]} {words}, which Open CASCADE does not read"
+    for kind, count in counts.items():
+        if _OTHERS.fullmatch(kind):
+            yield f"{count} {kind}, which Open CASCADE does not read"
     products = [*_children(XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).BaseLabel())]
     shells = {Key(shell) for product in products for shell in explore(Tool.GetShape_s(product), "SHELL")}
     if (closed := counts["CLOSED_SHELL"]) > len(shells):

@@ -16,12 +16,12 @@ from clamp3d.clamp.states import state as find_state
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.files.formats import UNITS_MM
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import check_mesh_error
 from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files
 from clamp3d.output.manifest import manifest
-from clamp3d.output.mesh_formats import MILLIMETRES
 from clamp3d.output.placed import PlacedPart, PosedMesh, place, posed
 from clamp3d.output.shared_bodies import shared_bodies
 from clamp3d.output.step import step
@@ -206,7 +206,7 @@ def _target(
     checks.choice("layout", layout, LAYOUTS)
     if unit is None:
         unit = "m" if chosen == "glb" else "mm"
-    checks.choice("unit", unit, MILLIMETRES)
+    checks.choice("unit", unit, UNITS_MM)
     if chosen == "glb" and unit != "m":
         raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
     if file is not None and layout == "parts":

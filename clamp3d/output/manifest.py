@@ -15,10 +15,10 @@ import numpy as np
 
 from clamp3d import __version__
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.meshing import volume_bounds
 from clamp3d.geometry.shapes import Solid
-from clamp3d.output.mesh_formats import MILLIMETRES
 from clamp3d.output.placed import PlacedPart, PosedMesh
 
 
@@ -78,7 +78,7 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
     else:
         assert isinstance(shape, (Solid, BrepSolid))  # a mesh has triangles
         bounds = shape.bounds_at(item.T)
-    bounds = bounds / MILLIMETRES[settings["unit"]]
+    bounds = bounds / UNITS_MM[settings["unit"]]
     if settings["up"] == "Y":  # axes X, Z, -Y
         bounds = np.array([bounds[0], bounds[1]])[[[0, 0, 1], [1, 1, 0]], [0, 2, 1]] * [1.0, 1.0, -1.0]
     entry["bounds"] = (np.round(bounds, 9) + 0.0).tolist()

@@ -15,15 +15,13 @@ import numpy as np
 
 from clamp3d.errors import InputError, need
 from clamp3d.files.bodies import Component
+from clamp3d.files.formats import UNITS_MM
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PosedMesh
 
 if TYPE_CHECKING:
     import trimesh
-
-MILLIMETRES: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-"""Units of the files that can be chosen, in mm."""
 
 _3MF_UNITS = {"mm": "MilliMeter", "cm": "CentiMeter", "m": "Meter", "in": "Inch"}
 _Z_UP_TO_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
@@ -102,7 +100,7 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
             nodes[assembly] = add(assembly.instance, assembly.T, assembly.assembly), assembly.T
         parent, T_parent = nodes[assembly]
         T = inverse(T_parent) @ T
-        T[:3, 3] /= MILLIMETRES["m"]
+        T[:3, 3] /= UNITS_MM["m"]
         names[key := f"node {len(names)}"] = name
         scene.graph.update(frame_to=key, frame_from=parent, matrix=T, geometry=geometry)  # type: ignore[no-untyped-call]
         return key
@@ -110,7 +108,7 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
     for item in items:
         geometry = meshes.setdefault((id(item.mesh), item.colour), f"mesh {len(meshes)}")
         if geometry not in scene.geometry:
-            local = trimesh.Trimesh(item.mesh.vertices / MILLIMETRES["m"] + 0.0, item.mesh.faces, process=False)
+            local = trimesh.Trimesh(item.mesh.vertices / UNITS_MM["m"] + 0.0, item.mesh.faces, process=False)
             scene.geometry[geometry] = local
             shown.append(item)
         add(item.label, item.T, item.component.assembly if item.component else None, geometry)
@@ -183,9 +181,9 @@ def _in_six_digits(item: PosedMesh, unit: str) -> tuple[Array, Array]:
     """Vertices (n, 3) and pose (4, 4) in a unit: lib3mf writes six digits of a pose, the rest is put
     into the vertices."""
     T = item.T.copy()
-    T[:3, 3] /= MILLIMETRES[unit]
+    T[:3, 3] /= UNITS_MM[unit]
     written = np.vectorize(lambda value: float(f"{value:.6g}"))(T)
-    local = np.asarray(item.mesh.vertices) / MILLIMETRES[unit]
+    local = np.asarray(item.mesh.vertices) / UNITS_MM[unit]
     if not np.array_equal(written, T):
         rest = np.linalg.solve(written, T)
         local = local @ rest[:3, :3].T + rest[:3, 3]
@@ -196,8 +194,8 @@ def _check_rounding(format: str, items: Sequence[PosedMesh], unit: str) -> None:
     """Raise InputError if the 32-bit coordinates of a format would lose more than the mesh error (0.1 um at least)."""
     allowed = max(1e-4, min(item.mesh.metadata["mesh_error"] for item in items))
     for item in items:
-        corners = item.world / MILLIMETRES[unit]
-        rounding = float(np.abs(corners.astype(np.float32) - corners).max()) * MILLIMETRES[unit]
+        corners = item.world / UNITS_MM[unit]
+        rounding = float(np.abs(corners.astype(np.float32) - corners).max()) * UNITS_MM[unit]
         if rounding > allowed:
             raise InputError(
                 f"{format} holds 32-bit numbers: the pose of {item.label} would lose {rounding:.2g} mm, allowed "
@@ -209,7 +207,7 @@ def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
     """A part's mesh in the world in a file's unit, without negative zeros, in its colour."""
     import trimesh
 
-    vertices = item.world / MILLIMETRES[unit] + 0.0
+    vertices = item.world / UNITS_MM[unit] + 0.0
     colours = np.tile(np.array([*rgb(item.colour), 255], dtype=np.uint8), (len(vertices), 1))
     return trimesh.Trimesh(vertices, item.mesh.faces, vertex_colors=colours, process=False)
 

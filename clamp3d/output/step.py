@@ -13,7 +13,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.files.bodies import Component
-from clamp3d.files.open_cascade import explore, parse
+from clamp3d.files.open_cascade import explore, location, parse
 from clamp3d.files.solid import BrepSolid, require_open_cascade
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, inverse
@@ -153,10 +153,10 @@ def solid(part: Solid) -> Any:
         shape = BRepAlgoAPI_Fuse(shape, _prism(body)).Shape()
     for hole in part.holes:
         shape = BRepAlgoAPI_Cut(shape, _prism(hole, _THROUGH)).Shape()
-    shape = _only_solid(shape, part)
-    if not BRepCheck_Analyzer(shape).IsValid():
-        raise Clamp3dError(f"Open CASCADE finds the solid of {part.name} not valid")
-    return shape
+    solids = [*explore(shape, "SOLID")]
+    if len(solids) != 1 or not BRepCheck_Analyzer(solids[0]).IsValid():
+        raise Clamp3dError(f"Open CASCADE makes no valid solid of {part.name}")
+    return solids[0]
 
 
 def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
@@ -185,13 +185,6 @@ def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
     return BRepPrimAPI_MakePrism(face, gp_Vec(*(along * (shape.length + 2.0 * overlap)).tolist())).Shape()
 
 
-def _only_solid(shape: Any, part: Solid) -> Any:
-    solids = list(explore(shape, "SOLID"))
-    if len(solids) != 1:
-        raise Clamp3dError(f"Open CASCADE makes {len(solids)} solids of {part.name}, expected 1")
-    return solids[0]
-
-
 def exact_solid(item: PlacedPart) -> Any:
     """The TopoDS_Shape of a part: drawn anew, or as it came from CAD. Raises InputError for a mesh."""
     if isinstance(item.shape, BrepSolid):
@@ -199,13 +192,3 @@ def exact_solid(item: PlacedPart) -> Any:
     if isinstance(item.shape, Solid):
         return solid(item.shape)
     raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")
-
-
-def location(T: Array) -> Any:
-    """A pose (4, 4) in mm as a TopLoc_Location."""
-    from OCP.gp import gp_Trsf
-    from OCP.TopLoc import TopLoc_Location
-
-    transform = gp_Trsf()
-    transform.SetValues(*T[:3].flatten().tolist())
-    return TopLoc_Location(transform)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, Struct
 
-from clamp3d.geometry.pose import UNIT_TOLERANCE, Array, nearest_rigid, rotation, turn_of
+from clamp3d.geometry.pose import UNIT_TOLERANCE, Array, PoseWarning, check_pose, rotation, turn_of
 
-_SNAP = 1e-4
 Number = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Vector = tuple[Number, Number, Number]
 Angle = Annotated[float, Meta(gt=-1e5, lt=1e5)]
@@ -50,25 +50,18 @@ class Pose(Table):
         if self.matrix is not None:
             if any(self.translation):
                 raise ValueError("matrix: holds the translation already")
-            if len(self.matrix) not in (3, 4) or self.matrix[3:] not in ([], [(0.0, 0.0, 0.0, 1.0)]):
-                raise ValueError("matrix: must have 3 rows of 4 numbers, or a fourth row 0, 0, 0, 1")
-            R = np.array(self.matrix)[:3, :3]
-            with np.errstate(over="ignore", invalid="ignore"):
-                off = float(np.abs(R @ R.T - np.eye(3)).max())
-            if not off <= _SNAP:
-                raise ValueError(f"matrix: must be rigid (a rotation and a translation): deviates by {off:.3g}")
-            if np.linalg.det(R) < 0.0:
-                raise ValueError("matrix: must be rigid (a rotation and a translation): it reflects")
+            if len(self.matrix) not in (3, 4):
+                raise ValueError(f"matrix: must have 3 or 4 rows of 4 numbers, got {len(self.matrix)}")
+            self.T()
 
     def T(self) -> Array:
         """The pose (4, 4). A typed matrix is brought to the nearest rotation: its printed digits are not exact."""
+        if self.matrix is not None:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", PoseWarning)
+                return check_pose([*self.matrix[:3], *(self.matrix[3:] or [(0, 0, 0, 1)])], "matrix:")
         T = np.eye(4)
         T[:3, 3] = self.translation
-        if self.matrix is not None:
-            T[:3] = self.matrix[:3]
-            nearest = nearest_rigid(T)
-            # Exact input stays exact: a product of factors is not.
-            return T if np.abs(nearest - T).max() < 1e-14 else nearest
         if self.rpy_deg is not None:
             roll, pitch, yaw = map(math.radians, self.rpy_deg)
             R = (rotation([0, 0, 1], yaw) @ rotation([0, 1, 0], pitch) @ rotation([1, 0, 0], roll))[:3, :3]

@@ -154,7 +154,10 @@ def test_motions():
         ),
         (BOX + "pose = { axis = [0, 0, 1] }\n", "parts.box.pose.axis: give axis and angle_deg together"),
         (BOX + "pose = { matrix = [[2,0,0,0],[0,1,0,0],[0,0,1,0]] }\n", "parts.box.pose.matrix: must be rigid"),
-        (BOX + "pose = { matrix = [[-1,0,0,0],[0,1,0,0],[0,0,1,0]] }\n", "(a rotation and a translation): it reflects"),
+        (
+            BOX + "pose = { matrix = [[-1,0,0,0],[0,1,0,0],[0,0,1,0]] }\n",
+            "pose.matrix: must be rigid: it reflects",
+        ),
         (BOX + "holes = [{ radius = 30 }]\n", "parts.box: hole of radius 30 mm at (0.0, 0.0) leaves nothing"),
         (BOX + "holes = [{ radius = 3, at = [90, 0] }]\n", "parts.box: hole of radius 3 mm at (90.0, 0.0) lies beside"),
         (

@@ -15,9 +15,9 @@ from typing import Any
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import GROOVE, WIRE, block, pair
-from clamp3d.files.open_cascade import explore
+from clamp3d.files.open_cascade import explore, location
 from clamp3d.geometry.pose import Array, inverse
-from clamp3d.output.step import location, solid
+from clamp3d.output.step import solid
 
 
 def distance_less(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepared:
