@@ -74,6 +74,11 @@ class Rod:
             np.minimum(self.radius - np.hypot(local[:, 0], local[:, 1]), 0.5 * self.length - np.abs(local[:, 2]))
         )
 
+    @property
+    def flat_normals(self) -> Array:
+        """Unit normals (2, 3) of the flat faces."""
+        return np.array([self.T[:3, 2], -self.T[:3, 2]])
+
     def normals(self, n: Array) -> Array:
         """Directions near ``n`` (k, 3) in which the surface is flat or round (m, 3): the axis, and across it."""
         axis = self.T[:3, 2]
@@ -167,8 +172,7 @@ def _slab_of_faces(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
     trials = []
     for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
-        axes = piece.T[:3, 2] * np.array([[1.0], [-1.0]]) if isinstance(piece, Rod) else piece.planes[:200, :3]
-        trials.append((sign * axes) @ T[:3, :3].T)
+        trials.append((sign * piece.flat_normals) @ T[:3, :3].T)
     low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
     return Distance(low, normal=normal, method="convex")
 

@@ -16,6 +16,8 @@ FLAT = 1e-8
 """Sine of the angle below which a face or line counts as square to a direction."""
 STRAIGHT = 1e-9
 """Sine of the turn of an outline below which it goes straight on."""
+_FACES = 200
+"""Faces of a polyhedron whose normals a search begins with."""
 _SLIVER = 1e-12
 """Relative to the size: triangles narrower than this have no plane to speak of."""
 _MEMORY = 2_000_000
@@ -67,6 +69,11 @@ class Hull:
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
         return np.asarray(-(points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
+
+    @property
+    def flat_normals(self) -> Array:
+        """Unit normals (k, 3) of the faces, of a body that is nearly round only some."""
+        return self.planes[:_FACES, :3]
 
     def normals(self, n: Array) -> Array:
         """The face normals (k, 3) nearest to ``n`` (k, 3)."""
