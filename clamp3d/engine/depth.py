@@ -80,7 +80,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
     if shared is None:
         return replace(distance, lower=-np.inf, interference=interference)
     # Meshes around drawn bodies attest no depth.
-    attested = 0.0 if a.between or b.between else deepest(outer_a, outer_b, T, shared)[0]
+    attested = 0.0 if a.bracketed or b.bracketed else deepest(outer_a, outer_b, T, shared)[0]
     deep = max(interference[0], attested)
     upper = min(distance.upper, -deep) if deep > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, deep)

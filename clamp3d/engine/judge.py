@@ -91,7 +91,7 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
 
 def _chord(level: int, *models: Model) -> float:
     """How far (mm) meshes around and inside of drawn solids are from the solids."""
-    return sum(model.chords[level] for model in models if model.between)
+    return sum(model.chords[level] for model in models if model.bracketed)
 
 
 def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:

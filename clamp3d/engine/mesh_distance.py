@@ -38,7 +38,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) 
     """
     cuts = _CUTS if a.exact is None or b.exact is None else _FEW_CUTS
     outer = surface_distance(a.outer(error), b.outer(error), T, enough, cuts)
-    if not (a.between or b.between):
+    if not (a.bracketed or b.bracketed):
         return outer
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
@@ -55,7 +55,7 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) 
 
 def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     """Last point (3,) of a drawn solid at ``T`` (4, 4) on the way from a point of its inner mesh to one outside."""
-    if model.bodies is None or not model.between:
+    if model.bodies is None or not model.bracketed:
         return inside
     R, t = T[:3, :3], T[:3, 3]
     low, high = 0.0, 1.0

@@ -1,4 +1,7 @@
-"""A shape's models, each made the first time somebody asks for it, kept, and counted."""
+"""What the levels ask of a shape: its closed form, its meshes, the exact solid; each is made on first use.
+
+There is one class for each kind of shape: drawn solids, solids from CAD, and given meshes.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clamp3d.engine.closed_form import ClosedForm
 from clamp3d.engine.drawn import bodies_of
@@ -35,8 +37,6 @@ _MOST_COARSE = 3000
 """Triangles of the coarse mesh of a solid from CAD beyond which the fine one costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
-Maker = Callable[[Solid, float], tuple[Array, NDArray[np.int64]] | None]
-
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 """Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
@@ -60,117 +60,53 @@ class Counters:
 
 
 class Model:
-    """All that can be known of one shape; ``counters`` is told what is built."""
+    """All that can be known of one shape; ``counters`` counts what is built."""
+
+    shape: Shape
+    drawn = False
+    """Whether it is a drawn solid."""
+    bracketed = False
+    """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
+    closed = True
+    """Whether it is known what is inside: not of a mesh with open or crossed edges."""
+    chords: tuple[float, ...] = ()
+    """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
+    exact: BrepSolid | None = None
+    """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
 
     def __init__(self, shape: Shape, counters: Counters) -> None:
         self.shape = shape
         self.counters = counters
-        self._inner: dict[float, Surface | None] = {}
-        self._outer: dict[float, Surface | None] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return model_of, (self.shape, Counters())
 
     @property
     def name(self) -> str:
         """The shape's name."""
         return self.shape.name
 
-    @cached_property
+    @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
-        if isinstance(self.shape, (Solid, BrepSolid)):
-            return self.shape.bounds
-        V = self.shape.mesh.vertices
-        reach = self.shape.error + (_bulge(self.shape) if self.shape.fit != "off" else 0.0)
-        return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
+        raise NotImplementedError
 
-    @cached_property
+    @property
     def bodies(self) -> tuple[ClosedForm, ...] | None:
         """The shape in closed form; None if it has none."""
-        if isinstance(self.shape, Solid):
-            return bodies_of(self.shape)
-        if not self.closed or not self.chords:
-            return None
-        mesh = self._cad_mesh(CHORD) if self.exact is not None else self.raw
-        if self._fit is not None and self._fit.features:
-            from clamp3d.engine.fitted import bodies_of_fit
+        raise NotImplementedError
 
-            if self.exact is not None:
-                tessellation = self.exact.tessellated(CHORD)
-                flat = self.exact.surfaces.kind[tessellation.face] == PLANE
-                return bodies_of_fit(self._fit, mesh, chord=tessellation.errors, flat=flat)
-            return bodies_of_fit(self._fit, mesh, stated=self.shape.error)
-        if len(mesh.faces) > _LARGE:  # the mesh is quicker than a hull of so many faces
-            return None
-        off = hull_error(mesh.vertices, mesh.faces)
-        if off > _CONVEX * mesh.scale:
-            return None
-        return (ClosedForm((self._hull(mesh.vertices),), error=mesh.error + off),)
+    def outer(self, chord: float) -> Surface:
+        """Mesh of chord error ``chord`` mm that holds a drawn solid; of other shapes one whose errors are known."""
+        raise NotImplementedError
 
-    @property
-    def forms(self) -> tuple[ClosedForm, ...]:
-        """The closed form, or the hull in place of it."""
-        return self.bodies if self.bodies is not None else (self.hull_body,)
-
-    @cached_property
-    def _fit(self) -> FitResult | None:
-        """Round surfaces found in a mesh, or named by a CAD file; None where none are looked for."""
-        if isinstance(self.shape, BrepSolid):
-            if not (self.shape.surfaces.kind == CYLINDER).any():
-                return None
-            from clamp3d.fit.fit import fit_solid
-
-            return fit_solid(self.shape)
-        if not isinstance(self.shape, MeshShape) or self.shape.fit == "off" or not self.closed:
-            return None
-        from clamp3d.fit.fit import fit_mesh
-
-        self.counters.built["fits"] += 1
-        return fit_mesh(self.shape.mesh)
-
-    @cached_property
-    def simple(self) -> bool:
-        """Whether closed forms, or a small hull in place of them, are quicker to ask than the mesh."""
-        if isinstance(self.shape, Solid):
-            return True
-        small = bool(self.chords) and len(self.outer(self.chords[0]).faces) <= _LARGE
-        return small or (self.bodies is not None and all(form.surface is None for form in self.bodies))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.shape, Counters())
-
-    @property
-    def drawn(self) -> bool:
-        """Whether it is a drawn solid."""
-        return isinstance(self.shape, Solid)
-
-    @property
-    def exact(self) -> BrepSolid | None:
-        """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
-        return self.shape if isinstance(self.shape, BrepSolid) else None
-
-    @cached_property
-    def hull_body(self) -> ClosedForm:
-        """Convex hull of a mesh that holds the part: for lower bounds alone."""
-        outer = self.outer(DRAWN_CHORDS[0])
-        return ClosedForm((self._hull(outer.vertices),), error=outer.error, surface=_nowhere)
-
-    def _hull(self, points: Array) -> Hull:
-        self.counters.built["hulls"] += 1
-        return hull(points)
-
-    @property
-    def chords(self) -> tuple[float, ...]:
-        """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
-        if isinstance(self.shape, BrepSolid):
-            return self._cad_chords
-        arcs = isinstance(self.shape, Solid) and any(e.profile.arcs for e in (*self.shape.bodies, *self.shape.holes))
-        return DRAWN_CHORDS if arcs else DRAWN_CHORDS[:1]
+    def inner(self, chord: float) -> Surface | None:
+        """Mesh of chord error ``chord`` mm that a drawn solid holds, or None; of other shapes the same as `outer`."""
+        return self.outer(chord)
 
     def refine_to(self, chord: float) -> bool:
         """Use meshes of chord error ``chord`` mm of a solid from CAD from now on; whether that is new."""
-        if not self.chords or self.chords[-1] <= chord:
-            return False
-        self._cad_chords = (*self.chords, chord)
-        return True
+        return False
 
     @property
     def refines(self) -> bool:
@@ -178,9 +114,101 @@ class Model:
         return len(self.chords) > 1
 
     @cached_property
-    def _cad_chords(self) -> tuple[float, ...]:
-        """The chord errors for a solid from CAD; none if Open CASCADE's triangles do not close: then it is asked."""
-        assert isinstance(self.shape, BrepSolid)
+    def enclosing(self) -> tuple[ClosedForm, ...]:
+        """The closed form, or the convex hull of a mesh that holds the part: for lower bounds alone."""
+        if self.bodies is not None:
+            return self.bodies
+        outer = self.outer(DRAWN_CHORDS[0])
+        return (ClosedForm((self._hull(outer.vertices),), error=outer.error),)
+
+    @cached_property
+    def quick_bodies(self) -> tuple[ClosedForm, ...] | None:
+        """The closed form where it is quicker to ask than the mesh; else None."""
+        if self.bodies is None or all(form.surface is None for form in self.bodies):
+            return self.bodies
+        return self.bodies if len(self.outer(self.chords[0]).faces) <= _LARGE else None
+
+    def _hull_of_convex(self, mesh: Surface) -> tuple[ClosedForm, ...] | None:
+        """A mesh that is its own hull, but for rounding; None if it is not, or so large that the mesh is quicker."""
+        if len(mesh.faces) > _LARGE:
+            return None
+        off = hull_error(mesh.vertices, mesh.faces)
+        if off > _CONVEX * mesh.scale:
+            return None
+        return (ClosedForm((self._hull(mesh.vertices),), error=mesh.error + off),)
+
+    def _hull(self, points: Array) -> Hull:
+        self.counters.built["hulls"] += 1
+        return hull(points)
+
+    def _counted(self, surface: Surface) -> Surface:
+        self.counters.built["meshes"] += 1
+        self.counters.built["triangles"] += len(surface.faces)
+        return surface
+
+
+class DrawnModel(Model):
+    """A drawn solid: exact pieces, and meshes inside and around it."""
+
+    shape: Solid
+    drawn = True
+
+    def __init__(self, shape: Solid, counters: Counters) -> None:
+        super().__init__(shape, counters)
+        round_ = any(outline.profile.arcs for outline in (*shape.bodies, *shape.holes))
+        self.chords = DRAWN_CHORDS if round_ else DRAWN_CHORDS[:1]  # without arcs one mesh is exact
+        self.bracketed = round_
+        self._outer: dict[float, Surface] = {}
+        self._inner: dict[float, Surface | None] = {}
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of the part's box, mm."""
+        return self.shape.bounds
+
+    @cached_property
+    def bodies(self) -> tuple[ClosedForm, ...] | None:
+        """Convex pieces less grooves and holes; None for outlines that have no such form."""
+        return bodies_of(self.shape)
+
+    def outer(self, chord: float) -> Surface:
+        """Mesh of chord error ``chord`` mm that holds the part."""
+        chord = max(chord, self.chords[-1])
+        if chord not in self._outer:
+            mesh = enclosing(self.shape, chord)
+            assert mesh is not None
+            self._outer[chord] = self._counted(Surface(*mesh))
+        return self._outer[chord]
+
+    def inner(self, chord: float) -> Surface | None:
+        """Mesh of chord error ``chord`` mm that the part holds; None if none is made."""
+        if not self.bracketed:
+            return self.outer(chord)
+        chord = max(chord, self.chords[-1])
+        if chord not in self._inner:
+            mesh = enclosed(self.shape, chord)
+            self._inner[chord] = None if mesh is None else self._counted(Surface(*mesh))
+        return self._inner[chord]
+
+
+class CadModel(Model):
+    """A solid from CAD: its named cylinders, triangles by Open CASCADE with their errors, and the solid itself."""
+
+    shape: BrepSolid
+
+    def __init__(self, shape: BrepSolid, counters: Counters) -> None:
+        super().__init__(shape, counters)
+        self.exact = shape
+        self._meshes: dict[float, Surface] = {}
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of a box that holds the solid, mm."""
+        return self.shape.bounds
+
+    @cached_property
+    def chords(self) -> tuple[float, ...]:  # type: ignore[override]
+        """The chord errors (mm) of its meshes; none if Open CASCADE's triangles do not close: then it is asked."""
         try:
             faces = self.shape.tessellated(CAD_CHORDS[0]).faces
         except Clamp3dError:
@@ -189,20 +217,85 @@ class Model:
             return ()
         return CAD_CHORDS if len(faces) <= _MOST_COARSE else CAD_CHORDS[:1]
 
-    @property
-    def closed(self) -> bool:
-        """Whether it is known what is inside: not of a mesh with open or crossed edges."""
-        return isinstance(self.shape, (Solid, BrepSolid)) or self.shape.mesh.watertight
-
-    @property
-    def between(self) -> bool:
-        """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
-        return isinstance(self.shape, Solid) and self.refines
+    def refine_to(self, chord: float) -> bool:
+        """Use meshes of chord error ``chord`` mm from now on; whether that is new."""
+        if not self.chords or self.chords[-1] <= chord:
+            return False
+        self.chords = (*self.chords, chord)
+        return True
 
     @cached_property
-    def raw(self) -> Surface:
-        """The facets of a mesh; round faces are off by the error of the fit, all by what the shape states."""
-        assert not isinstance(self.shape, (Solid, BrepSolid))
+    def bodies(self) -> tuple[ClosedForm, ...] | None:
+        """Bodies around the solid with the cylinders and holes that its faces name; None without any."""
+        if not self.chords:
+            return None
+        mesh = self._mesh(CHORD)
+        if not (self.shape.surfaces.kind == CYLINDER).any():
+            return self._hull_of_convex(mesh)
+        from clamp3d.engine.fitted import bodies_of_fit
+        from clamp3d.fit.fit import fit_solid
+
+        fit = fit_solid(self.shape)
+        if not fit.features:
+            return self._hull_of_convex(mesh)
+        tessellation = self.shape.tessellated(CHORD)
+        flat = self.shape.surfaces.kind[tessellation.face] == PLANE
+        return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
+
+    def outer(self, chord: float) -> Surface:
+        """Mesh of chord error ``chord`` mm, each triangle with its own error."""
+        return self._mesh(max(chord, self.chords[-1]))
+
+    def _mesh(self, chord: float) -> Surface:
+        if chord not in self._meshes:
+            mesh = self.shape.tessellated(chord)
+            error = at_edges(mesh.vertices, mesh.faces, mesh.errors)
+            self._meshes[chord] = self._counted(Surface(mesh.vertices, mesh.faces, error))
+        return self._meshes[chord]
+
+
+class MeshModel(Model):
+    """Given triangles, with the round surfaces that a fit finds in them."""
+
+    shape: MeshShape
+    chords = DRAWN_CHORDS[:1]
+
+    @property
+    def closed(self) -> bool:  # type: ignore[override]
+        """Whether it is known what is inside: not of a mesh with open or crossed edges."""
+        return self.shape.mesh.watertight
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
+        V = self.shape.mesh.vertices
+        reach = self.shape.error + (_bulge(self.shape) if self.shape.fit != "off" else 0.0)
+        return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
+
+    @cached_property
+    def bodies(self) -> tuple[ClosedForm, ...] | None:
+        """Bodies around the mesh with the cylinders, grooves and holes of the fit, or its hull if it is convex."""
+        if not self.closed:
+            return None
+        if self._fit is not None and self._fit.features:
+            from clamp3d.engine.fitted import bodies_of_fit
+
+            return bodies_of_fit(self._fit, self.facets, stated=self.shape.error)
+        return self._hull_of_convex(self.facets)
+
+    @cached_property
+    def _fit(self) -> FitResult | None:
+        """Round surfaces found in the mesh; None where none are looked for."""
+        if self.shape.fit == "off" or not self.closed:
+            return None
+        from clamp3d.fit.fit import fit_mesh
+
+        self.counters.built["fits"] += 1
+        return fit_mesh(self.shape.mesh)
+
+    @cached_property
+    def facets(self) -> Surface:
+        """The triangles; round faces are off by the error of the fit, all by what the shape states."""
         V, F = self.shape.mesh.vertices, self.shape.mesh.faces
         error = np.full(len(F), self.shape.error) if self.shape.error else None
         if self._fit is not None and self._fit.features:
@@ -214,46 +307,16 @@ class Model:
             error = at_edges(V, F, error, patch)
         return self._counted(Surface(V, F, error))
 
-    def outer(self, error: float) -> Surface:
-        """Mesh of chord error ``error`` mm that holds a drawn solid; a mesh shape's own facets, whose errors it has."""
-        surface = self._made(self._outer, enclosing, error)
-        assert surface is not None
-        return surface
-
-    def inner(self, error: float) -> Surface | None:
-        """Mesh of chord error ``error`` mm that a drawn solid holds, or None; a mesh shape's own facets."""
-        return self._made(self._inner, enclosed, error)
-
-    def _made(self, kept: dict[float, Surface | None], make: Maker, error: float) -> Surface | None:
-        if isinstance(self.shape, BrepSolid):
-            kept = self._inner
-        elif not isinstance(self.shape, Solid):
-            return self.raw
-        elif not self.refines:  # outlines without arcs are exact at any chord error: one mesh serves all
-            kept, error = self._inner, DRAWN_CHORDS[0]
-        error = max(error, self.chords[-1])
-        if error not in kept:
-            if isinstance(self.shape, BrepSolid):
-                kept[error] = self._cad_mesh(error)
-            else:
-                mesh = make(self.shape, error)
-                kept[error] = None if mesh is None else self._counted(Surface(*mesh))
-        return kept[error]
-
-    def _cad_mesh(self, chord: float) -> Surface:
-        assert isinstance(self.shape, BrepSolid)
-        mesh = self.shape.tessellated(chord)
-        return self._counted(Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors)))
-
-    def _counted(self, surface: Surface) -> Surface:
-        self.counters.built["meshes"] += 1
-        self.counters.built["triangles"] += len(surface.faces)
-        return surface
+    def outer(self, chord: float) -> Surface:
+        """The triangles, whatever ``chord``."""
+        return self.facets
 
 
-def _nowhere(points: Array) -> Array:
-    """Depth of points (k, 3) in a part whose hull stands for it: what of the hull is material the meshes know."""
-    return np.full(len(points), -np.inf)
+def model_of(shape: Shape, counters: Counters) -> Model:
+    """The model of a shape, by its kind."""
+    if isinstance(shape, Solid):
+        return DrawnModel(shape, counters)
+    return CadModel(shape, counters) if isinstance(shape, BrepSolid) else MeshModel(shape, counters)
 
 
 def _bulge(shape: MeshShape) -> float:
@@ -281,5 +344,5 @@ class ModelCache:
     def model(self, shape: Shape) -> Model:
         """The one model of a shape and its equals."""
         if shape not in self._models:
-            self._models[shape] = Model(shape, self.counters)
+            self._models[shape] = model_of(shape, self.counters)
         return self._models[shape]

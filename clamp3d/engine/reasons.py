@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import MeshModel, Model
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import Clamp3dError, one_line
 
@@ -20,7 +20,7 @@ def undecided(models: dict[str, Model], distance: Distance, thresholds: Threshol
     for name, model in models.items():
         if not model.closed:
             advice.append(f"a closed mesh of {name}")
-        elif model.exact is None and not model.drawn and model.raw.error > 0.0:
-            advice.append(f"a finer mesh of {name} (its round faces are off by up to {model.raw.error:.2g} mm)")
+        elif isinstance(model, MeshModel) and model.facets.error > 0.0:
+            advice.append(f"a finer mesh of {name} (its round faces are off by up to {model.facets.error:.2g} mm)")
     would = f"; what would decide: {' or '.join(advice)}" if advice else ""
     return (f"between the bounds: {marks}" if marks else "the bounds allow several verdicts") + would

@@ -68,8 +68,8 @@ def _levels(a: Model, b: Model, T: Array, cad_forms: bool) -> Iterator[Callable[
         return
     both_exact = a.exact is not None and b.exact is not None
     forms = cad_forms or not both_exact
-    if forms and a.simple and b.simple:
-        yield lambda enough: _by_closed_forms(a, b, T, enough)
+    if forms and a.quick_bodies is not None and b.quick_bodies is not None:
+        yield partial(_by_closed_forms, a, b, T, (a.quick_bodies, b.quick_bodies))
     if forms:
         yield from _cylinders_on_facets(a, b, T)
     for chord in _chords(a, b):
@@ -142,37 +142,29 @@ def _of_open_meshes(a: Model, b: Model, T: Array) -> Distance:
     return open_distance(a, b, T).labelled("meshes", f"surfaces (FCL), inside of {names} unknown")
 
 
-def _by_closed_forms(a: Model, b: Model, T: Array, enough: Enough) -> Distance:
-    """Closed forms of both; the convex hull of a part that has none stands in for it."""
-    level = "hulls" if a.bodies is None or b.bodies is None else "features"
-    if len(a.forms) == len(b.forms) == 1:
-        a.counters.queries[level] += 1
-        distance = bodies_distance(a.forms[0], b.forms[0], T, enough)
-    else:
-        distance = _nearest_of_several(a, b, T, level)
-    return distance.labelled(level, f"{distance.method} on hulls" if level == "hulls" else distance.method)
-
-
-def _nearest_of_several(a: Model, b: Model, T: Array, level: str) -> Distance:
-    """The nearest pair of the pieces of two bodies, of which one has several."""
-    forms = [*a.forms, *b.forms]
-    poses = np.where(np.arange(len(forms))[:, None, None] < len(a.forms), np.eye(4), T)
-    boxes = Boxes.of(np.array([form.bounds for form in forms]), poses)
-    rows = np.array(list(itertools.product(range(len(a.forms)), range(len(a.forms), len(forms)))))
-    pairs: list[tuple[float, int, ClosedForm, ClosedForm]] = []
-    for k, ((i, j), gap) in enumerate(zip(rows, box_gaps(boxes, rows), strict=True)):
-        x, y = forms[i], forms[j]
-        pairs.append((float(gap) - x.error - y.error, k, x, y))
+def _by_closed_forms(
+    a: Model, b: Model, T: Array, bodies: tuple[tuple[ClosedForm, ...], tuple[ClosedForm, ...]], enough: Enough
+) -> Distance:
+    """The nearest pair of the bodies of two parts, asked in the order of their boxes' distances."""
+    n, forms = len(bodies[0]), [*bodies[0], *bodies[1]]
+    if len(forms) == 2:
+        a.counters.queries["features"] += 1
+        distance = bodies_distance(forms[0], forms[1], T, enough)
+        return distance.labelled("features", distance.method)
+    boxes = Boxes.of(np.array([form.bounds for form in forms]), np.array([np.eye(4)] * n + [T] * len(bodies[1])))
+    rows = np.array(list(itertools.product(range(n), range(n, len(forms)))))
+    gaps = box_gaps(boxes, rows) - np.array([forms[i].error + forms[j].error for i, j in rows.tolist()])
     distance = Distance(np.inf, np.inf)
-    for gap, _, x, y in sorted(pairs):
-        if gap > distance.upper:  # of these and all that follow
+    for k in np.argsort(gaps, kind="stable").tolist():
+        if gaps[k] > distance.upper:  # of these and all that follow
             break
-        a.counters.queries[level] += 1
-        distance = distance.union(bodies_distance(x, y, T, lambda d: d.upper - d.lower <= 1e-10))
+        a.counters.queries["features"] += 1
+        i, j = rows[k].tolist()
+        distance = distance.union(bodies_distance(forms[i], forms[j], T, lambda d: d.upper - d.lower <= 1e-10))
     if distance.lower < -1e-6:
         # Where two pieces of a body meet, neither knows how deep a point lies in both together.
         distance = replace(distance, lower=-np.inf)
-    return distance
+    return distance.labelled("features", distance.method)
 
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:

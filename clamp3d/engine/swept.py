@@ -32,8 +32,8 @@ def swept_lower(
     if not screw:  # seen from a, the points of b are on spirals, which no arc bounds
         a, b, there, back = b, a, back, there
     best = np.inf
-    for x in a.forms:
-        for y in b.forms:
+    for x in a.enclosing:
+        for y in b.enclosing:
             low = _one_way(x, y, there, angle)
             if screw:
                 low = max(low, _bores(y, x, back, angle))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import MeshModel, Model
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array
@@ -102,7 +102,7 @@ class Locator:
             point = self._in_world(deepest(inner_a, inner_b, self.T_ab, inner)[1])
         corners = self._in_world(outer.vertices)
         box = np.array([corners.min(axis=0) - off, corners.max(axis=0) + off])
-        unknown_error = any(model.exact is None and not model.between and not model.drawn for model in (self.a, self.b))
+        unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
         return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
 
     def _exact(self, rough: Overlap | None) -> Overlap | None:

@@ -111,6 +111,6 @@ def test_bounding_boxes_hold_the_shape(shape):
     inside = body(shape).field(x) < 0.0
     assert (x[inside] >= model.bounds[0] - 1e-9).all()
     assert (x[inside] <= model.bounds[1] + 1e-9).all()
-    for form in model.forms:
+    for form in model.enclosing:
         deep = form.depth(x)
         assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()
