@@ -10,46 +10,22 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.errors import escaped
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
     from clamp3d.baselines.model import ContactModel
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly, Waypoint
 
 
-class Narrator:
-    """Lines on stderr, and in ``status`` what changes: only where it is a terminal, and nothing if ``quiet``."""
-
-    def __init__(self, quiet: bool, status: Status | None) -> None:
-        self._quiet, self._status = quiet, status
-
-    def status(self, text: str) -> None:
-        """What is going on now; not shown where stderr is a file."""
-        if self._status is not None:
-            from rich.text import Text
-
-            self._status.update(Text(escaped(text)))
-
-    def waypoint(self, waypoint: Waypoint) -> None:
-        """A line that stays, above the status: what a run has reached."""
-        if not self._quiet:
-            print(escaped(f"{waypoint.step:14s} {waypoint.label}"), file=sys.stderr)
-
-    def position(self, tried: int, distance: float) -> None:
-        """What a solver is trying."""
-        self.status(f"closing: {tried} positions tried, {distance:.3f} mm")
-
-
 @contextmanager
-def narrator(quiet: bool) -> Iterator[Narrator]:
-    """A `Narrator` on stderr for the time of the block."""
+def narrator(quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A function that says on stderr what is going on now; silent if ``quiet``, or if stderr is no terminal."""
     if quiet or not sys.stderr.isatty():
-        yield Narrator(quiet, None)
+        yield lambda text: None
         return
     from rich.console import Console
+    from rich.text import Text
 
     with Console(stderr=True).status("") as status:
-        yield Narrator(quiet, status)
+        yield lambda text: status.update(Text(escaped(text)))
 
 
 def narrated(
@@ -62,13 +38,20 @@ def narrated(
     """Assemble a clamp with the waypoints on stderr, and to ``listeners``."""
     from clamp3d.clamp.assemble import assemble
 
-    with narrator(quiet) as narrate:
+    def listen(waypoint: Waypoint) -> None:
+        for listener in listeners:
+            listener(waypoint)
+        if not quiet:
+            print(escaped(f"{waypoint.step:14s} {waypoint.label}"), file=sys.stderr)
 
-        def listen(waypoint: Waypoint) -> None:
-            for listener in (*listeners, narrate.waypoint):
-                listener(waypoint)
-
-        return assemble(clamp, model, on_waypoint=listen, progress=narrate.position, **settings)
+    with narrator(quiet) as say:
+        return assemble(
+            clamp,
+            model,
+            on_waypoint=listen,
+            progress=lambda tried, distance: say(f"closing: {tried} positions tried, {distance:.3f} mm"),
+            **settings,
+        )
 
 
 @contextmanager

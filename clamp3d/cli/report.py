@@ -49,8 +49,8 @@ def command(
         method.refuse()
         subject = loaded
     with narrator(quiet) as narrate:
-        review = make_report(subject, clearance=clearance, progress=narrate.status)
-        paths = write_report(review, output, progress=narrate.status)
+        review = make_report(subject, clearance=clearance, progress=narrate)
+        paths = write_report(review, output, progress=narrate)
     for path in paths:
         show(str(path))
     if review.assembly is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -93,7 +94,7 @@ class Page:
                 with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; the result decides the exit code
                     if viewing.timeout is None and not self.quiet:
                         click.echo("serving the page until Ctrl-C ...", err=True)
-                    viewer.wait(viewing.timeout)
+                    threading.Event().wait(viewing.timeout)
 
     def _save(self, viewer: Viewer) -> None:
         path = self.viewing.html_file

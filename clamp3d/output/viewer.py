@@ -11,9 +11,9 @@ from __future__ import annotations
 import base64
 import itertools
 import math
-import threading
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,8 @@ from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import Command, Pieces, SceneDrawing
-from clamp3d.output.viewer_story import LISTED, ClampStory, SceneStory, Stop, findings_of, focus, worst_pairs
-from clamp3d.output.wording import counted, distance_text, headline, meaning, severity, titles
+from clamp3d.output.viewer_story import LISTED, ClampStory, SceneStory, Stop, findings_of, focus
+from clamp3d.output.wording import counted, distance_text, headline, meaning, severity, titles, worst_first
 from clamp3d.scenefile.check import opened
 
 _SEVERITY = {"error": "clash", "warning": "contact"}
@@ -45,7 +45,7 @@ _PAUSE = 0.5
 """Seconds between two looks at a check that is running."""
 
 
-class Viewer:
+class Viewer(AbstractContextManager["Viewer"]):
     """Shows a clamp or a scene from the start; `show` adds a waypoint, `show_row` a verdict, `finish` the result.
 
     Parameters
@@ -161,17 +161,10 @@ class Viewer:
         """Write `html` to a file. Raises InputError if it cannot be written."""
         write_text(Path(path), self.html())
 
-    def wait(self, timeout: float | None = None) -> None:
-        """Keep serving for ``timeout`` s, or until interrupted."""
-        threading.Event().wait(timeout)
-
     def close(self) -> None:
         """Stop serving the page; a meshcat server keeps the scene. A second call does nothing."""
         if isinstance(self._server, PageServer):
             self._server.close()
-
-    def __enter__(self) -> Viewer:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -221,8 +214,8 @@ class Viewer:
             "text": headline(result),
             "state": severity(result),
             "findings": [self._with_margin(finding) for finding in findings],
-            "pairs": worst_pairs(result.pairs),
-            "motions": worst_pairs(result.motions),
+            "pairs": worst_first(result.pairs)[:LISTED],
+            "motions": worst_first(result.motions)[:LISTED],
             "notes": [*result.scene.notes, *work_text(result.work)],
         }
 
@@ -260,15 +253,13 @@ class Viewer:
         numbered = enumerate(self.story["findings"])
         used = {row["verdict"] for stop in stops for row in stop["rows"]}
         context = {
-            "subtitle": source.subtitle,
-            "scene": source.scene,
+            "source": source,
+            "drawing": drawing,
             "state": state,
             "accuracy": self._accuracy,
             "parts": titles(source.scene),
-            "part_colours": drawing.colours,
             "colours": VERDICT_COLOURS,
             "force_colour": FORCE,
-            "force_length": drawing.force_length,
             "meanings": {name: meaning(name, source.scene) for name in VERDICT_COLOURS if name in used},
             "groups": [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])],
             "version": __version__,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -393,8 +393,3 @@ def _clamp_way(start: Poses, end: Poses, before: float, turn: float, f: float) -
             poses[name][:3, :3] = Slerp([0.0, 1.0], turns)(f).as_matrix()
     poses["P5"] = poses["P5"] @ rotation((0.0, 0.0, 1.0), before + f * (turn - before))
     return poses
-
-
-def worst_pairs(rows: Iterable[PairResult]) -> Sequence[PairResult]:
-    """The rows of a table on the page."""
-    return worst_first(list(rows))[:LISTED]
