@@ -41,18 +41,8 @@ playwright_api = pytest.importorskip(
 )
 Image = pytest.importorskip("PIL.Image")
 
-ARGUMENTS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+ARGUMENTS = ["--no-sandbox", *SOFTWARE]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CUT = {"P1": (110.0, 8.0), "P2": (-58.0, 30.0), "P3": (-16.5, 57.0), "P6": (-9.0, 0.0), "P7": (-4.5, 0.0)}
 """Points (u, v) of cut faces that no label, contact or other part covers in the final state."""
