@@ -1,7 +1,7 @@
-"""Checks of values that come from outside: each returns the value as what it should be, or raises InputError.
+"""Each function validates and converts one argument from outside, or raises InputError.
 
-A number is a real number: an int, a float, a NumPy scalar or an array of no dimension; no text, no bool, nothing
-complex, so that a slip is refused and not converted.
+A number is a real number: an int, a float, a NumPy scalar or a zero-dimensional array. Strings, bools and complex
+numbers are refused, not converted.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ def shown(value: object) -> str:
         value = value.item()
     try:
         text = repr(value[:80] if isinstance(value, (str, bytes)) else value)
-    except Exception:  # an int of more digits than Python prints; an object that cannot be shown
+    except Exception:  # an int with more digits than Python prints; an object without a repr
         return type(value).__name__
     text = " ".join(text.split())
     return text if len(text) <= 80 and not (isinstance(value, str) and len(value) > 80) else text[:76] + " ..."
 
 
 def readable_file(path: Path, most: float = math.inf) -> int:
-    """Size in bytes of a file that can be read to its end: no folder, pipe or device, and at most ``most`` bytes."""
+    """Size in bytes of a regular file (no folder, pipe or device) of at most ``most`` bytes."""
     try:
         status = os.stat(path)
     except FileNotFoundError:
@@ -58,7 +58,7 @@ def readable_file(path: Path, most: float = math.inf) -> int:
 
 
 def short(value: object, most: int = 200) -> str:
-    """``str`` of a value, for messages: long ones lose their middle."""
+    """``str`` of a value, for messages; a long one without its middle."""
     text = str(value)
     return text if len(text) <= most else f"{text[: most // 2]} ... {text[-most // 2 :]}"
 
@@ -78,7 +78,7 @@ def number(name: str, value: object, *, rule: str = "be a finite number") -> flo
 
 
 def real(value: object) -> float | None:
-    """A real number as a float, NaN and infinities too; None for anything else."""
+    """A real number as a float, also NaN and infinities; None for anything else."""
     if isinstance(value, np.ndarray):
         if value.ndim or value.dtype.kind not in "iuf" or isinstance(value, np.ma.MaskedArray):
             return None
@@ -105,7 +105,7 @@ def positive(name: str, value: object) -> float:
 
 
 def whole(name: str, value: object, *, least: int, most: int | None = None) -> int:
-    """A whole number from ``least`` to ``most`` as an int."""
+    """An integer from ``least`` to ``most``."""
     if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.timedelta64)):
         n = int(value)
         if n >= least and (most is None or n <= most):
@@ -115,7 +115,7 @@ def whole(name: str, value: object, *, least: int, most: int | None = None) -> i
 
 
 def array(name: str, value: object, shape: tuple[int | None, ...], *, finite: bool = True) -> NDArray[np.float64]:
-    """Real numbers as a float64 array of ``shape``, None for any length; what is one already is not copied.
+    """Real numbers as a float64 array of ``shape``, with None for any length; a float64 array is not copied.
 
     >>> array("axis", (0, 0, 1), (3,)).tolist()
     [0.0, 0.0, 1.0]
@@ -137,8 +137,8 @@ def array(name: str, value: object, shape: tuple[int | None, ...], *, finite: bo
 
 
 def _as_floats(value: object) -> NDArray[np.float64] | None:
-    """Real numbers of any type as float64, None for what is none."""
-    if "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray):  # numpy loads it when it is named
+    """Real numbers of any type as float64; None for anything else."""
+    if "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray):  # NumPy imports it on first use
         return None
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return value.view(np.ndarray)
@@ -182,7 +182,7 @@ def choice(name: str, value: object, choices: Iterable[str]) -> None:
 
 
 def items(name: str, value: object, what: str) -> tuple[Any, ...]:
-    """The items of a list, a tuple or another sequence, not of a text; ``what`` they are, for the message."""
+    """The items of a list, tuple or other sequence, not of a string; ``what`` names them in the message."""
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview)):
         return tuple(value)
     if isinstance(value, (set, frozenset, np.ndarray)) and getattr(value, "ndim", 1) > 0:

@@ -5,11 +5,11 @@ import re
 from typing import Any
 
 LONGEST = 900
-"""Characters of a message: what a user gave may be longer."""
+"""Most characters of a message: a value in it may be longer."""
 
 
 def escaped(text: str, *, keep: str = "") -> str:
-    r"""A text with its control characters, which a terminal would obey, as escape sequences; those in ``keep`` stay.
+    r"""A text with its control characters, which a terminal would execute, escaped; those in ``keep`` stay.
 
     >>> escaped("red: \x1b[31m")
     'red: \\x1b[31m'
@@ -18,7 +18,7 @@ def escaped(text: str, *, keep: str = "") -> str:
 
 
 def one_line(message: str) -> str:
-    r"""A message on one short line, whatever the names and values in it hold.
+    r"""A message as one short line, whatever names and values it contains.
 
     >>> one_line("no file named 'a\nb'")
     "no file named 'a\\nb'"
@@ -40,7 +40,7 @@ class InputError(Clamp3dError, ValueError):
 
 
 class NotClampedError(InputError):
-    """A clamp does not hold both wires, which the question takes for granted (exit code 1). The message says why."""
+    """A clamp does not hold both wires, which the calculation requires (exit code 1). The message says why."""
 
 
 class SolverError(Clamp3dError):
@@ -48,14 +48,14 @@ class SolverError(Clamp3dError):
 
 
 class SequenceError(Clamp3dError):
-    """A sequence asks for a motion that bodies block (exit code 1). The message says which, where and when.
+    """Parts block a step of a sequence (exit code 1). The message says which parts, where and when.
 
     Attributes
     ----------
     blocks : tuple
-        What blocks each way that was tried, the one that leads furthest first.
+        What blocks each path that was tried, the one that leads furthest first.
     scene : Scene or None
-        The parts that are there, with the motion on the first of these ways.
+        The parts assembled so far, with the motion along the first of these paths.
     """
 
     def __init__(self, message: object = "", blocks: tuple[Any, ...] = (), scene: Any = None) -> None:
@@ -77,11 +77,11 @@ EXTRAS = {
     "skimage": "image",
     "yourdfpy": "urdf",
 }
-"""Optional libraries, and the extra of this package that each one comes with."""
+"""Optional libraries, and the extra of this package that installs each."""
 
 
 def need(library: str, what: str) -> None:
-    """Raise MissingLibraryError unless one of the `EXTRAS` that ``what`` needs is installed: to ask before long work.
+    """Raise MissingLibraryError unless a library of `EXTRAS` is installed that ``what`` needs; call before long work.
 
     >>> need("matplotlib", "a drawing")
     """
@@ -94,12 +94,12 @@ def need(library: str, what: str) -> None:
 
 
 def missing(library: str, what: str) -> MissingLibraryError:
-    """The error that says which extra has a library that ``what`` needs."""
+    """The error that names the extra with a library that ``what`` needs."""
     return MissingLibraryError(f"{what} needs {library}: pip install 'clamp3d[{EXTRAS[library]}]'")
 
 
 def without_numbers(message: str) -> str:
-    """The rule without the values, so that equal reasons count together.
+    """A message without its numbers, so that equal reasons count together.
 
     >>> without_numbers("radius of P1 must be > 0 mm, got -1.5e-3")
     'radius of P1 must be > ... mm, got ...'

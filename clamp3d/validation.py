@@ -1,4 +1,4 @@
-"""Values from files and from Python as dataclasses and tables, by msgspec; what is wrong as one line."""
+"""Validates values from files and from Python against dataclasses, by msgspec; errors are one line."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _KINDS = {
 
 
 def checked(kind: type[T]) -> type[T]:
-    """A dataclass with keywords alone that raises InputError with one line when it is made of wrong values."""
+    """A dataclass with keyword arguments only, which raises InputError for invalid values."""
 
     cls: typing.Any = kind
 
@@ -44,22 +44,22 @@ def checked(kind: type[T]) -> type[T]:
 
 
 def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "", *, strict: bool = True) -> typing.Any:
-    """``data`` as ``kind`` (a dataclass or a msgspec.Struct); ``key`` is where it stands in ``origin``.
+    """Convert ``data`` to ``kind`` (a dataclass or a msgspec.Struct); ``key`` is its place in ``origin``.
 
-    Unless ``strict`` a number may also be a text.
+    Unless ``strict``, a number may also be a string.
     Raises InputError: one line with origin, key, value and rule.
     """
     if isinstance(data, dict) and isinstance(kind, type) and is_dataclass(kind):
         hints, data = _hints(kind), dict(data)
         for name, value in data.items():
-            if name not in hints:  # which msgspec lets pass
+            if name not in hints:  # which msgspec ignores
                 raise InputError(f"{origin}: {_unknown(_joined(key, name), name, list(hints))}")
             if isinstance(value, dict):
                 data[name] = validate(_bare(hints[name]), value, origin, _joined(key, name))
     try:
         return msgspec.convert(data, kind, strict=strict)
     except msgspec.ValidationError as failure:
-        raise InputError(f"{origin}: {_told(failure, kind, data, key)}") from None
+        raise InputError(f"{origin}: {_message(failure, kind, data, key)}") from None
 
 
 @functools.cache
@@ -67,12 +67,12 @@ def _hints(kind: typing.Any) -> dict[str, typing.Any]:
     return typing.get_type_hints(kind, include_extras=True)
 
 
-def _told(failure: msgspec.ValidationError, kind: typing.Any, data: typing.Any, key: str) -> str:
-    """Key, value and rule of what msgspec found in ``data``, which is no ``kind``."""
+def _message(failure: msgspec.ValidationError, kind: typing.Any, data: typing.Any, key: str) -> str:
+    """Key, value and rule for an error of msgspec."""
     message, _, path = str(failure).partition(" - at `")
     for name, number in re.findall(r"\.(\w+)|\[(\d+|\.\.\.)\]", path):
         key, kind, data = _below(key, kind, data, name or number)
-    if failure.__cause__ is not None:  # one of our own rules, which begin with the key
+    if failure.__cause__ is not None:  # one of our own rules; it begins with the key
         return _joined(checks.short(key, 100), str(failure.__cause__))
     kind = _bare(kind)
     if path.startswith("key` in `"):
@@ -87,7 +87,7 @@ def _told(failure: msgspec.ValidationError, kind: typing.Any, data: typing.Any, 
 
 
 def _rule(message: str, kind: typing.Any, data: typing.Any) -> str:
-    """What ``data`` must be to be a ``kind``, of which msgspec's ``message`` says something."""
+    """The rule of ``kind`` that ``data`` breaks, from msgspec's ``message``."""
     if typing.get_origin(kind) is typing.Literal:
         *most, last = map(repr, typing.get_args(kind))
         return f"{', '.join(most)} or {last}" if most else last
@@ -103,7 +103,7 @@ def _rule(message: str, kind: typing.Any, data: typing.Any) -> str:
 
 
 def _below(key: str, kind: typing.Any, data: typing.Any, step: str) -> tuple[str, typing.Any, typing.Any]:
-    """Key, kind and value of what stands in a table or list under ``step``; `...` for the first value that is wrong."""
+    """Key, kind and value of one entry of a table or list; ``step`` `...` is the first invalid value."""
     kind = _bare(kind)
     inner = typing.get_args(kind)
     if step == "...":
@@ -117,7 +117,7 @@ def _below(key: str, kind: typing.Any, data: typing.Any, step: str) -> tuple[str
 
 
 def _bare(kind: typing.Any) -> typing.Any:
-    """A type without its bounds, and without None beside it."""
+    """A type without its bounds and without None."""
     while typing.get_origin(kind) is typing.Annotated or type(None) in typing.get_args(kind):
         kind = typing.get_args(kind)[0]
     return kind

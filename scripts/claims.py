@@ -50,15 +50,15 @@ def comparison_table(data: Mapping[str, Any]) -> str:
     return "\n".join([f"| {' | '.join(_HEADER)} |", "|---" + "|---:" * (len(_HEADER) - 1) + "|", *lines])
 
 
-def update(page: Path, made: str) -> None:
-    """Put ``made`` between the marks of a page. Raises InputError for a page without marks."""
+def update(page: Path, table: str) -> None:
+    """Put ``table`` between the marks of a page. Raises InputError for a page without marks."""
     from clamp3d.output.files import write_text
 
     text = page.read_text(encoding="utf-8")
     if START not in text or END not in text[text.index(START) :]:
         raise InputError(f"{page.name} must have the marks {START} and {END}")
     before, rest = text.split(START, 1)
-    write_text(page, f"{before}{START}\n{made}\n{END}{rest.split(END, 1)[1]}")
+    write_text(page, f"{before}{START}\n{table}\n{END}{rest.split(END, 1)[1]}")
 
 
 def assembly_table(data: Mapping[str, Any]) -> str:

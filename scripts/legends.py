@@ -111,7 +111,7 @@ def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = 
     from matplotlib.patches import Arc, Circle
 
     blue, yellow = PART_COLOURS["P1"], PART_COLOURS["P6"]
-    found = arc_circle(_R, half_angle, _r, x, y, tolerance=_TOLERANCE)
+    contact = arc_circle(_R, half_angle, _r, x, y, tolerance=_TOLERANCE)
     ends = (270.0 - math.degrees(half_angle), 270.0 + math.degrees(half_angle))
     m = np.array([-_R * math.sin(half_angle), -_R * math.cos(half_angle)])
     _region(ax, ends, blue)
@@ -124,10 +124,10 @@ def _arc_cell(ax: Axes, half_angle: float, x: float, y: float, *, fig_6: bool = 
         ax.annotate(name, point, offset, textcoords="offset points", ha="center", **_SMALL)
     if fig_6:
         _construction(ax, m)
-    if found.relation not in (ArcRelation.INSIDE, ArcRelation.OUTSIDE):
-        for px, py in found.points:
-            _dot(ax, px, py, "clash" if found.relation is ArcRelation.INTERSECT else "contact")
-    _caption(ax, found.relation.value, f"gap {found.gap:z.2f}")
+    if contact.relation not in (ArcRelation.INSIDE, ArcRelation.OUTSIDE):
+        for px, py in contact.points:
+            _dot(ax, px, py, "clash" if contact.relation is ArcRelation.INTERSECT else "contact")
+    _caption(ax, contact.relation.value, f"gap {contact.gap:z.2f}")
 
 
 def _region(ax: Axes, ends: tuple[float, float], colour: str) -> None:

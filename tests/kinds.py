@@ -23,8 +23,8 @@ TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 
 def box_mesh(size, error=None):
     """The mesh of a box, with one error for all its triangles."""
-    made = trimesh.creation.box(size)
-    return Surface(np.array(made.vertices), np.array(made.faces), None if error is None else np.full(12, error))
+    cuboid = trimesh.creation.box(size)
+    return Surface(np.array(cuboid.vertices), np.array(cuboid.faces), None if error is None else np.full(12, error))
 
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")
@@ -55,13 +55,13 @@ DRAWN = [
 
 def faceted_shape(solid: shapes.Solid, error: float, fit: shapes.Fit = "off") -> shapes.MeshShape:
     """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
-    made = mesh(solid, error)
-    return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, solid.name)
+    facets = mesh(solid, error)
+    return shapes.MeshShape(make_mesh(facets.vertices, facets.faces), fit, solid.name)
 
 
-def pose(axis: tuple[float, ...], angle: float, at: tuple[float, ...]) -> np.ndarray:
+def pose(axis: tuple[float, ...], angle: float, place: tuple[float, ...]) -> np.ndarray:
     T = rotation(axis, angle)
-    T[:3, 3] = at
+    T[:3, 3] = place
     return T
 
 

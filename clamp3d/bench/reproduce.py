@@ -47,8 +47,8 @@ class ConnectionRow:
         claims = {"published": self.published, "declared": self.declared}
         wrong = [f"{name} {kind}" for name, kind in claims.items() if kind != self.measured]
         apart = f"does not touch: {millimetres(self.distance.lower)} mm apart or more"
-        found = apart if self.measured == 0 else f"touches as {self.measured}"
-        return f"{' and '.join(wrong)}, but {found}" if wrong else ""
+        what = apart if self.measured == 0 else f"touches as {self.measured}"
+        return f"{' and '.join(wrong)}, but {what}" if wrong else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,17 +83,17 @@ class DistanceRow:
 
 @dataclass(frozen=True, slots=True)
 class PoseRow:
-    """One part of the final state relative to the power line: (x, y, angle_deg) found and published."""
+    """One part of the final state relative to the power line: (x, y, angle_deg) computed and published."""
 
     part: PartName
-    found: tuple[float, float, float]
+    computed: tuple[float, float, float]
     published: tuple[float, float, float]
     T_line_part: Array
 
     @property
     def matrices(self) -> tuple[Array, Array]:
         """Found and published (3, 3) as the paper writes them: x right, y down, angles counter-clockwise as seen."""
-        return _matrix(*self.found), _matrix(*self.published)
+        return _matrix(*self.computed), _matrix(*self.published)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +205,7 @@ def _table3() -> tuple[RelationRow, ...]:
     rows = []
     for kind, half in (("minor", 70.0), ("major", 110.0)):
         for name, depth in zip(published.TABLE_3, (6.0, 14.0, 9.0, 13.0, 7.0), strict=True):
-            found = arc_circle(10.0, math.radians(half), 3.0, 0.0, -depth, tolerance=1e-9)
+            contact = arc_circle(10.0, math.radians(half), 3.0, 0.0, -depth, tolerance=1e-9)
             words = f"{kind} arc ({2 * half:g} deg), circle {depth:g} mm below the centre"
-            rows.append(RelationRow(name, found.relation.value, words))
+            rows.append(RelationRow(name, contact.relation.value, words))
     return tuple(rows)

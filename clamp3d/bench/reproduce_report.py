@@ -50,7 +50,7 @@ def _pose_to_dict(row: PoseRow) -> dict[str, Any]:
     ours, theirs = row.matrices
     return {
         "part": row.part,
-        **dict(zip(names, row.found, strict=True)),
+        **dict(zip(names, row.computed, strict=True)),
         **{f"published_{name}": value for name, value in zip(names, row.published, strict=True)},
         "matrix": ours.tolist(),
         "published_matrix": theirs.tolist(),
@@ -92,12 +92,12 @@ def _gap(distance: Distance) -> str:
 
 
 def _pose(row: PoseRow) -> Sequence[object]:
-    apart = [f"{f - w:+z.3f}" for f, w in zip(row.found, row.published, strict=True)]
-    return [f"{row.part} {TITLES[row.part]}", *(f"{v + 0.0:z.3f}" for v in (*row.found, *row.published)), *apart]
+    apart = [f"{f - w:+z.3f}" for f, w in zip(row.computed, row.published, strict=True)]
+    return [f"{row.part} {TITLES[row.part]}", *(f"{v + 0.0:z.3f}" for v in (*row.computed, *row.published)), *apart]
 
 
 def _matrices(row: PoseRow) -> list[Sequence[object]]:
-    """Published and found (3, 3) beside ``T_P6_part`` (4, 4), line by line, and a blank line."""
+    """Published and computed (3, 3) beside ``T_P6_part`` (4, 4), line by line, and a blank line."""
     ours, theirs = row.matrices
     columns = [[" ".join(f"{v:z8.3f}" for v in line) for line in M] for M in (theirs, ours, row.T_line_part)]
     return [

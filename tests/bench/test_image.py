@@ -44,14 +44,14 @@ def shown(run: Assembly) -> Picture:
 
 def test_perfect_marks_give_the_exact_distance(run: Assembly, shown: Picture) -> None:
     left, right, below = shown.end_points
-    found = measure_image([left, below], [left, right], shown.reference)
-    assert found.distance == pytest.approx(run.distance, abs=1e-12)
-    assert found.mm_per_px == pytest.approx(1.0 / PX_PER_MM, abs=1e-15)
+    measured = measure_image([left, below], [left, right], shown.reference)
+    assert measured.distance == pytest.approx(run.distance, abs=1e-12)
+    assert measured.mm_per_px == pytest.approx(1.0 / PX_PER_MM, abs=1e-15)
     # P2's corner is half a width along the splint and face_depth below its origin, tilted by 12 degrees.
     t, down = run.poses["P2"].angle, run.clamp.down_splint
     sideways = run.clamp.up_splint.width / 2 - (down.width / 2 * math.cos(t) - down.face_depth * math.sin(t))
-    assert found.straight == pytest.approx(math.hypot(run.distance, sideways), abs=1e-9)
-    assert found.straight - found.height == pytest.approx(0.684, abs=1e-3)
+    assert measured.straight == pytest.approx(math.hypot(run.distance, sideways), abs=1e-9)
+    assert measured.straight - measured.height == pytest.approx(0.684, abs=1e-3)
 
 
 def _calibrated(shown: Picture, actual: float, values: Sequence[float]) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from clamp3d.cli import group
 
 
 @pytest.fixture(scope="module")
-def found() -> Reproduction:
+def tables() -> Reproduction:
     return reproduce()
 
 
@@ -39,12 +39,12 @@ def test_measured_types_do_not_follow_the_declaration() -> None:
     assert {pair: row.measured for pair, row in rows.items()} == {pair: row.measured for pair, row in honest.items()}
 
 
-def test_the_bolt_touches_no_splint_and_the_table_says_so(found: Reproduction) -> None:
-    rows = _by_pair(found.table1)
+def test_the_bolt_touches_no_splint_and_the_table_says_so(tables: Reproduction) -> None:
+    rows = _by_pair(tables.table1)
     assert len(rows) == 21
     different = {pair for pair, row in rows.items() if row.difference}
     assert different == {("P1", "P4"), ("P2", "P4")}
-    text = reproduction_to_text(found).splitlines()
+    text = reproduction_to_text(tables).splitlines()
     for pair in ("P1-P4", "P2-P4"):
         assert rows[tuple(pair.split("-"))].distance.upper > 0.99  # type: ignore[index]
         (line,) = [line for line in text if line.startswith(f"  {pair} ")]
@@ -54,20 +54,20 @@ def test_the_bolt_touches_no_splint_and_the_table_says_so(found: Reproduction) -
     assert gap == pytest.approx(1.0, abs=1e-6)
 
 
-def test_errors_of_table_4_are_those_that_the_paper_prints(found: Reproduction) -> None:
+def test_errors_of_table_4_are_those_that_the_paper_prints(tables: Reproduction) -> None:
     printed = {None: 0.100, 1.0: 0.233, 5.0: 0.233, 10.0: 0.233, 20.0: 0.566, 40.0: 1.233}
-    for row in found.table4:
+    for row in tables.table4:
         assert row.published_error == pytest.approx(printed[row.unit_angle_deg], abs=1e-9)
         if row.solver == "stepped":
             assert row.error == pytest.approx(printed[row.unit_angle_deg], abs=2e-3)
     image = [0.904, 2.042, 2.483, 0.820, 0.989]
     assert [abs(v - published.ACTUAL_DISTANCE) for v in published.IMAGE_DISTANCES] == pytest.approx(image)
-    text = reproduction_to_text(found)
+    text = reproduction_to_text(tables)
     assert all(f"{error:.3f}" in text for error in (*printed.values(), *image))
 
 
-def test_the_command_matches_the_paper(found: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("clamp3d.bench.reproduce.reproduce", lambda progress: found)
+def test_the_command_matches_the_paper(tables: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clamp3d.bench.reproduce.reproduce", lambda progress: tables)
     path = tmp_path / "r.json"
     done = CliRunner().invoke(group, ["reproduce", "--json", str(path)])
     assert done.exit_code == 0, done.output

@@ -51,15 +51,15 @@ def in_process(command):
 def console(example):
     """Run each command of a console block, and compare what it prints."""
     for session in re.split(r"^\$ ", example.parsed, flags=re.MULTILINE)[1:]:
-        command, _, wanted = session.partition("\n")
+        command, _, expected = session.partition("\n")
         plain = re.fullmatch(r"""clamp3d ([^|<>&;$`*"]|"[^$`"]*")*""", command)
         done = in_process(command) if plain else in_bash(command)
         if done.returncode not in (0, 1, 3):
             return f"{command}\nexit code {done.returncode}: {done.stderr}"
-        wanted = "\n".join(line.rstrip() for line in wanted.strip("\n").split("\n")) + "\n"
+        expected = "\n".join(line.rstrip() for line in expected.strip("\n").split("\n")) + "\n"
         got = "\n".join(line.rstrip() for line in done.stdout.strip("\n").split("\n")) + "\n"
-        if wanted.strip() and not doctest.OutputChecker().check_output(wanted, got, doctest.ELLIPSIS):
-            return f"{command}\nwanted:\n{wanted}\ngot:\n{got}\nstderr:\n{done.stderr}"
+        if expected.strip() and not doctest.OutputChecker().check_output(expected, got, doctest.ELLIPSIS):
+            return f"{command}\nwanted:\n{expected}\ngot:\n{got}\nstderr:\n{done.stderr}"
     return None
 
 
@@ -78,8 +78,8 @@ def shell(example):
             command = cli.group.get_command(click.Context(cli.group), words[1])
             if command is None:
                 return f"no such command: {line}"
-            known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
-            unknown = [w for w in words[2:] if w.startswith("-") and w != "-" and w.split("=")[0] not in known]
+            options = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
+            unknown = [w for w in words[2:] if w.startswith("-") and w != "-" and w.split("=")[0] not in options]
             if unknown:
                 return f"{line}: unknown {unknown}"
     return None

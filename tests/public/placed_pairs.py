@@ -107,8 +107,8 @@ def drilled(rng, low, high, radius):
     """A plate from ``low`` to ``high`` along z with a hole of ``radius`` in the middle and six more around it."""
     size = radius + rng.uniform(14.0, 20.0)
     far = radius + 7.0
-    around = [(far * math.cos(k * math.pi / 3), far * math.sin(k * math.pi / 3)) for k in range(6)]
-    holes = [rod(2.0, low - 1, high + 1, x, y) for x, y in around]
+    centres = [(far * math.cos(k * math.pi / 3), far * math.sin(k * math.pi / 3)) for k in range(6)]
+    holes = [rod(2.0, low - 1, high + 1, x, y) for x, y in centres]
     return cut(block((-size, -size, low), (size, size, high)), rod(radius, low - 1, high + 1), *holes)
 
 
@@ -268,8 +268,8 @@ def thread():
     """The helical ridge of an M10 screw, and the radius of its crest: nearly 5, for it is made of splines."""
     from bd_warehouse.thread import IsoThread
 
-    made = IsoThread(major_diameter=10, pitch=1.5, length=6, end_finishes=("square", "square"))
-    ridge = first_solid(made.wrapped)
+    iso = IsoThread(major_diameter=10, pitch=1.5, length=6, end_finishes=("square", "square"))
+    ridge = first_solid(iso.wrapped)
     return ridge, 6.0 - BRepExtrema_DistShapeShape(ridge, cut(rod(8, -4, 12), rod(6.0, -5, 13))).Value()
 
 
@@ -283,12 +283,12 @@ def thread_in_tube(rng, gap):
 def fastener(kind):
     from bd_warehouse.fastener import HexHeadScrew, HexNut, SocketHeadCapScrew
 
-    made = {
+    part = {
         "nut": lambda: HexNut("M8-1.25", "iso4032"),
         "hex": lambda: HexHeadScrew("M6-1", 20, "iso4014"),
         "cap": lambda: SocketHeadCapScrew("M6-1", 20, "iso4762"),
     }[kind]()
-    return first_solid(made.wrapped)
+    return first_solid(part.wrapped)
 
 
 def nut_on_plate(rng, gap):
@@ -414,11 +414,11 @@ def judge(pairs, result):
     for k, pair in enumerate(pairs):
         row = rows.get(frozenset(names[2 * k : 2 * k + 2]))
         verdict = "clear" if row is None else row.verdict.value
-        known = "right" if verdict in pair.right else "uncertain" if verdict == "uncertain" else "wrong"
-        counts[pair.family][known] += 1
-        if known != "right":
+        worth = "right" if verdict in pair.right else "uncertain" if verdict == "uncertain" else "wrong"
+        counts[pair.family][worth] += 1
+        if worth != "right":
             bounds = "" if row is None else f", [{row.distance.lower:.6g}, {row.distance.upper:.6g}] {row.reason}"
-            lines.append(f"{known}: {pair.family}, gap {pair.gap:.6g}: {verdict}{bounds}")
+            lines.append(f"{worth}: {pair.family}, gap {pair.gap:.6g}: {verdict}{bounds}")
         elif not holds(pair, row):
             counts[pair.family]["right"] -= 1
             counts[pair.family]["wrong"] += 1

@@ -66,19 +66,19 @@ LOOSE = {"a cylinder in a tube's wall", "a wire in a groove's bottom"}
 """Overlaps of bodies that are not convex, whose depth is an interval."""
 
 
-def exactly(truth, found, sharp=1e-6):
-    assert found.lower - 1e-9 <= truth <= found.upper + 1e-9
-    assert found.upper - found.lower < sharp
+def exactly(truth, measured, sharp=1e-6):
+    assert measured.lower - 1e-9 <= truth <= measured.upper + 1e-9
+    assert measured.upper - measured.lower < sharp
 
 
 @pytest.mark.parametrize("case", APART)
 def test_distances_of_bodies_apart(case):
     a, b, T, truth = APART[case]
-    found = distance(a, b, T)
+    measured = distance(a, b, T)
     sharp = LOOSE_APART.get(case, 1e-6)
-    exactly(truth, found, sharp)
-    assert np.linalg.norm(found.point_b - found.point_a) == pytest.approx(truth, abs=1e-6)
-    np.testing.assert_allclose(found.point_b - found.point_a, truth * found.normal, atol=1e-6)
+    exactly(truth, measured, sharp)
+    assert np.linalg.norm(measured.point_b - measured.point_a) == pytest.approx(truth, abs=1e-6)
+    np.testing.assert_allclose(measured.point_b - measured.point_a, truth * measured.normal, atol=1e-6)
     back = distance(b, a, np.linalg.inv(T))
     exactly(truth, back, sharp)
 
@@ -86,14 +86,14 @@ def test_distances_of_bodies_apart(case):
 @pytest.mark.parametrize("case", OVERLAPPING)
 def test_depths_of_bodies_that_overlap(case):
     a, b, T, truth = OVERLAPPING[case]
-    found = distance(a, b, T)
+    measured = distance(a, b, T)
     truth = 8.0 - float(np.hypot(T[0, 3], T[1, 3])) if truth is None else truth
-    assert found.lower - 1e-9 <= -truth <= found.upper + 1e-9
-    assert found.upper < 0.0
+    assert measured.lower - 1e-9 <= -truth <= measured.upper + 1e-9
+    assert measured.upper < 0.0
     if case not in LOOSE:
-        assert found.upper - found.lower < max(0.01, 0.05 * truth)
-    if found.normal is not None and math.isfinite(found.lower):
-        way = translation(*(-(found.lower - 1e-6) * found.normal))
+        assert measured.upper - measured.lower < max(0.01, 0.05 * truth)
+    if measured.normal is not None and math.isfinite(measured.lower):
+        way = translation(*(-(measured.lower - 1e-6) * measured.normal))
         assert distance(a, b, way @ T).lower >= -1e-6
 
 
@@ -113,19 +113,19 @@ def test_many_poses_are_measured_as_each_of_them(case):
 def test_verdicts_at_many_poses():
     ways = np.array([0.0, 0.04, 0.0549, 0.0551, 0.0749, 0.0751, 0.2])  # 0.065 mm of clearance, contact within 0.01
     scene = Scene(clearance=0.02).add("block", BLOCK).add("wire", WIRE)
-    found = check_poses(scene, "wire", np.array([translation(0, -way, 0) for way in ways]))
-    wanted = ["clear", "clear", "clearance", "contact", "contact", "clash", "clash"]
-    assert found.verdict[:, 0].tolist() == wanted
-    for way, verdict in zip(ways, wanted, strict=True):
+    swept = check_poses(scene, "wire", np.array([translation(0, -way, 0) for way in ways]))
+    expected = ["clear", "clear", "clearance", "contact", "contact", "clash", "clash"]
+    assert swept.verdict[:, 0].tolist() == expected
+    for way, verdict in zip(ways, expected, strict=True):
         row = check(scene.moved({"wire": translation(0, -way, 0)})).pairs
         assert (row[0].verdict.value if row else "clear") == verdict
 
 
 def test_a_wire_at_the_edge_of_contact_is_decided():
-    for depth, wanted in ((0.0101, "clash"), (0.0099, "contact")):
+    for depth, expected in ((0.0101, "clash"), (0.0099, "contact")):
         for turn in (np.eye(4), QUARTER):
             scene = Scene().add("a", cylinder(5, 40)).add("b", cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
-            assert check(scene).verdict("a", "b").value == wanted
+            assert check(scene).verdict("a", "b").value == expected
 
 
 # --- Open CASCADE -----------------------------------------------------------------------------------------------------
@@ -168,16 +168,16 @@ def test_random_poses_as_open_cascade_measures_them(pair):
     for k in range(10):
         T = random_pose(rng, 6.0 if k % 2 else 14.0)
         a, b = as_cad(one), moved(as_cad(two), T)
-        truth, found = BRepExtrema_DistShapeShape(a, b).Value(), distance(BODIES[one], BODIES[two], T)
+        truth, measured = BRepExtrema_DistShapeShape(a, b).Value(), distance(BODIES[one], BODIES[two], T)
         seen.add(truth > 0.0)
         if truth > 0.0:
-            exactly(truth, found, 2e-6)
+            exactly(truth, measured, 2e-6)
         elif common_volume(a, b) > 1e-6:
-            assert found.upper < 0.0
+            assert measured.upper < 0.0
             for way in rng.normal(size=(4, 3)):  # no shorter translation parts them
-                near = moved(b, translation(*(0.99 * -found.upper * way / np.linalg.norm(way))))
+                near = moved(b, translation(*(0.99 * -measured.upper * way / np.linalg.norm(way))))
                 assert BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
-            if found.normal is not None and math.isfinite(found.lower):
-                free = moved(b, translation(*(-found.lower * found.normal)))
+            if measured.normal is not None and math.isfinite(measured.lower):
+                free = moved(b, translation(*(-measured.lower * measured.normal)))
                 assert common_volume(a, free) < 1e-4
     assert seen == {True, False}

@@ -55,10 +55,10 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
             low, high = row.where.volume
             assert low * 0.999 - 1e-6 <= volume <= high * 1.001 + 1e-6
         elif volume == 0.0:
-            found = distance(as_shape(MADE[a]), as_shape(MADE[b]), T)
+            measured = distance(as_shape(MADE[a]), as_shape(MADE[b]), T)
             gap = one.min_gap(two, 60.0)
-            assert found.lower - 1e-6 <= gap <= found.upper + 1e-6
-            assert found.upper - found.lower < 1e-4
+            assert measured.lower - 1e-6 <= gap <= measured.upper + 1e-6
+            assert measured.upper - measured.lower < 1e-4
 
 
 @pytest.mark.parametrize("gap", [3.0, 0.4, 0.05, -0.3, -2.0])
@@ -67,21 +67,21 @@ def test_two_balls_are_as_far_apart_as_spheres_within_their_facets(gap):
     one, two = trimesh.creation.icosphere(4, r), trimesh.creation.icosphere(3, s)
     chords = sagitta(one, r) + sagitta(two, s)
     T = placed(np.random.default_rng(1), r + s + gap)
-    found = distance(as_shape(one), as_shape(two), T)
-    assert found.lower <= gap + chords
-    assert found.upper >= gap
+    measured = distance(as_shape(one), as_shape(two), T)
+    assert measured.lower <= gap + chords
+    assert measured.upper >= gap
     if gap > 0.0:
-        assert found.upper <= gap + chords + 1e-6
-        assert found.lower >= gap - 1e-4
+        assert measured.upper <= gap + chords + 1e-6
+        assert measured.lower >= gap - 1e-4
     elif gap < -chords:
-        assert found.upper < 0.0
+        assert measured.upper < 0.0
 
 
 @pytest.mark.parametrize(
-    ("gap", "wanted"), [(0.02, "clear"), (0.009, "contact"), (0.0, "contact"), (-0.009, "contact"), (-0.02, "clash")]
+    ("gap", "expected"), [(0.02, "clear"), (0.009, "contact"), (0.0, "contact"), (-0.009, "contact"), (-0.02, "clash")]
 )
 @pytest.mark.parametrize("format", ["stl", "glb"])
-def test_boxes_in_files_face_to_face(gap, wanted, format, tmp_path):
+def test_boxes_in_files_face_to_face(gap, expected, format, tmp_path):
     scene = trimesh.Scene()
     scene.add_geometry(MADE["box"], node_name="under", geom_name="under", transform=SKEW)
     scene.add_geometry(MADE["box"], node_name="over", geom_name="over", transform=SKEW @ translation(1, 2, 8 + gap))
@@ -94,8 +94,8 @@ def test_boxes_in_files_face_to_face(gap, wanted, format, tmp_path):
         loaded = load(tmp_path)
     assert {part.name for part in loaded.parts} == {"under", "over"}
     result = check(loaded)
-    assert result.verdict("under", "over").value == wanted
-    assert result.clean == (wanted != "clash")
+    assert result.verdict("under", "over").value == expected
+    assert result.clean == (expected != "clash")
 
 
 @pytest.mark.parametrize("name", MADE)

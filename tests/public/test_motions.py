@@ -23,8 +23,8 @@ WALL = box((60, 10, 100))
 
 
 def mesh_box(*size):
-    made = trimesh.creation.box(size)
-    return MeshShape(make_mesh(made.vertices, made.faces), "off")
+    mesh = trimesh.creation.box(size)
+    return MeshShape(make_mesh(mesh.vertices, mesh.faces), "off")
 
 
 def down(way):
@@ -59,12 +59,12 @@ def test_the_first_contact_is_neither_late_nor_early(case):
         motion = Motion.screw((0, 0, 1), motion.angle, point=(0, -20, 0), travel=float(motion.travel[2]))
         start = translation(0, -20, 0) @ start
         t = math.asin((15.0 - 2.0) / 20.0) / (math.pi / 2)
-    found = first_contact(a, b, motion, start)
-    assert found.touches
-    assert found.t <= t + 1e-9
-    assert found.t >= t - 3 * ACCURACY / speed - 1e-9
-    assert found.distance.upper <= ACCURACY
-    np.testing.assert_allclose(found.pose, motion.at(found.t, start), atol=1e-9)
+    hit = first_contact(a, b, motion, start)
+    assert hit.touches
+    assert hit.t <= t + 1e-9
+    assert hit.t >= t - 3 * ACCURACY / speed - 1e-9
+    assert hit.distance.upper <= ACCURACY
+    np.testing.assert_allclose(hit.pose, motion.at(hit.t, start), atol=1e-9)
 
 
 CLEARANCES = {
@@ -90,27 +90,27 @@ CLEARANCES = {
 @pytest.mark.parametrize("case", CLEARANCES)
 def test_the_least_clearance_on_a_way(case):
     a, b, motion, start, truth = CLEARANCES[case]
-    found = min_clearance(a, b, motion, start)
-    assert not found.touches
-    assert found.distance.lower - 1e-9 <= truth <= found.distance.upper + 1e-9
-    assert found.distance.upper - found.distance.lower < 0.005
-    assert found.distance.value == pytest.approx(truth, abs=0.003)
+    least = min_clearance(a, b, motion, start)
+    assert not least.touches
+    assert least.distance.lower - 1e-9 <= truth <= least.distance.upper + 1e-9
+    assert least.distance.upper - least.distance.lower < 0.005
+    assert least.distance.value == pytest.approx(truth, abs=0.003)
 
 
 @pytest.mark.parametrize(
-    ("way", "wanted"), [(30.0, "clearance"), (30.0651, "contact"), (30.0749, "contact"), (30.0751, "clash")]
+    ("way", "expected"), [(30.0, "clearance"), (30.0651, "contact"), (30.0749, "contact"), (30.0751, "clash")]
 )
-def test_verdicts_of_a_motion_in_a_scene(way, wanted):
+def test_verdicts_of_a_motion_in_a_scene(way, expected):
     scene = Scene(clearance=0.07, motions=()).add("block", BLOCK).add("wire", WIRE, translation(0, 30, 0))
     moving = Scene(scene.parts, clearance=0.07, motions=(Motion.translate((0, -way, 0), parts="wire", name="in"),))
     result = check(moving)
     (row,) = result.motions
-    assert (row.motion, row.verdict.value) == ("in", wanted)
-    assert result.clean == (wanted != "clash")
-    if wanted == "clash":
+    assert (row.motion, row.verdict.value) == ("in", expected)
+    assert result.clean == (expected != "clash")
+    if expected == "clash":
         assert row.contact_at == pytest.approx(30.055 / way, abs=1e-5)
     else:
-        assert row.contact_at is None or wanted == "contact"
+        assert row.contact_at is None or expected == "contact"
 
 
 @pytest.fixture(scope="module")
@@ -128,9 +128,9 @@ def plate_and_pin(tmp_path_factory):
 def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
     plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
     start = translation(aside, 0, 0) @ pin.T_world
-    found = min_clearance(plate.shape, pin.shape, down(20.0), start)
-    assert found.distance.lower - 1e-9 <= 0.1 - aside <= found.distance.upper + 1e-9
-    assert not found.touches
+    least = min_clearance(plate.shape, pin.shape, down(20.0), start)
+    assert least.distance.lower - 1e-9 <= 0.1 - aside <= least.distance.upper + 1e-9
+    assert not least.touches
 
 
 def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
@@ -142,17 +142,17 @@ def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
     path = write_parts(tmp_path / "over.step", plate=(plate, np.eye(4)), bar=(bar, np.eye(4)))
     parts = {part.name: part for part in load(path).parts}
     start = pose((1.0, 0.0, 0.0), math.pi / 2, (-10.0, 0.0, 8.05))
-    found = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)
-    assert found.distance.lower - 1e-6 <= 0.05 <= found.distance.upper + 1e-6
-    assert not found.touches
+    least = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)
+    assert least.distance.lower - 1e-6 <= 0.05 <= least.distance.upper + 1e-6
+    assert not least.touches
 
 
 @pytest.mark.parametrize(("aside", "t"), [(0.3, (10 - 3) / 20), (9.0, (10 - 3) / 20)])
 def test_a_pin_of_cad_beside_its_hole_meets_the_plate(plate_and_pin, aside, t):
     plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
-    found = first_contact(plate.shape, pin.shape, down(20.0), translation(aside, 0, 0) @ pin.T_world)
-    assert found.touches
-    assert t - 0.001 <= found.t <= t + 1e-9
+    hit = first_contact(plate.shape, pin.shape, down(20.0), translation(aside, 0, 0) @ pin.T_world)
+    assert hit.touches
+    assert t - 0.001 <= hit.t <= t + 1e-9
 
 
 def test_bodies_that_slide_along_each_other_and_meet_later_touch():

@@ -15,20 +15,20 @@ from clamp3d.kernel import translation
 @pytest.fixture
 def boxes(tmp_path):
     """Two boxes of 10 mm, 5 mm into each other, by everything that they can come as."""
-    at = translation(5.0, 0.0, 0.0)
+    T = translation(5.0, 0.0, 0.0)
     scene = trimesh.Scene()
     scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="a", geom_name="a")
-    scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="b", geom_name="b", transform=at)
+    scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="b", geom_name="b", transform=T)
     clamp3d.export(
-        clamp3d.Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), at), tmp_path / "two.glb"
+        clamp3d.Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), T), tmp_path / "two.glb"
     )
     box = shapes.box(10, 10, 10)
     return {
         "path": tmp_path / "two.glb",
-        "list": [("a", box), ("b", box, at)],
-        "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), at)],
+        "list": [("a", box), ("b", box, T)],
+        "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), T)],
         "trimesh": scene,
-        "scene": clamp3d.Scene().add("a", box).add("b", box, at),
+        "scene": clamp3d.Scene().add("a", box).add("b", box, T),
     }
 
 

@@ -1,10 +1,10 @@
 """Families of hard motions: a wire that moves past a groove, and the least distance on its way.
 
 A case is built backwards: a pose at a small gap from a feature of the groove, and a motion that goes through it at some
-instant. The truth is a search over the instants that knows only how fast the wire moves, from even ones, from the one
-that the case was built for, and from those that a method names. It asks the kernel for the distance of a pose, whose
-own truth is that of the families of poses. The value is one that the motion takes, so it is never too low; and as it is
-no higher than at any instant that is named, no method can be lower and right.
+time. The truth is a search over time that uses only the speed of the wire. It starts from evenly spaced times, from the
+time of the built pose, and from the times that a method names. The kernel measures single poses; the pose families
+test it. The value is attained, so it is never too low. It is no higher than at any named time, so a method
+with a lower value is wrong.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from clamp3d.kernel.distance import signed_distances
 
 TRUTH_ERROR = 1e-9
 """Largest error of a truth in parts of the scene."""
-_INSTANTS, _KEPT = 129, 24
-"""Instants of the first grid; instants of a case that are followed."""
+_TIMES, _KEPT = 129, 24
+"""Times of the first grid; times of a case that are followed."""
 _CONVEX = ("lip", "end arc", "end edge", "corner")
 """Features that a wire passes on a tangent."""
 
@@ -40,8 +40,8 @@ _CONVEX = ("lip", "end arc", "end edge", "corner")
 class Motions(Rows):
     """n motions: ``shape`` (n,) row of ``shapes``; a turn by ``angle`` (n,) rad and a ``travel`` (n, 3) mm from 0 to 1.
 
-    ``start`` (n, 4, 4) is ``T_groove_wire`` at instant 0; the turn is about ``axis`` (n, 3) through ``point`` (n, 3).
-    The case was built to be near at ``instant`` (n,); another place may come nearer. ``number`` (n,) tells the cases
+    ``start`` (n, 4, 4) is ``T_groove_wire`` at time 0; the turn is about ``axis`` (n, 3) through ``point`` (n, 3).
+    The case was built to be near at ``time`` (n,); another place may come nearer. ``number`` (n,) tells the cases
     apart when some are taken.
     """
 
@@ -52,21 +52,21 @@ class Motions(Rows):
     axis: Array
     angle: Array
     travel: Array
-    instant: Array
+    time: Array
     number: NDArray[np.intp]
 
     def motion(self, i: int) -> Motion:
         """Case i as a `Motion`."""
         return Motion(self.axis[i], self.point[i], float(self.angle[i]), self.travel[i])
 
-    def distances(self, i: int, instants: Array) -> Array:
-        """Signed distances (m,) of case i at some instants."""
+    def distances(self, i: int, times: Array) -> Array:
+        """Signed distances (m,) of case i at some times."""
         k, start, point = int(self.shape[i]), self.start[i], self.point[i]
-        turns = Rotation.from_rotvec(instants[:, None] * self.angle[i] * self.axis[i])
-        T = np.tile(np.eye(4), (len(instants), 1, 1))
+        turns = Rotation.from_rotvec(times[:, None] * self.angle[i] * self.axis[i])
+        T = np.tile(np.eye(4), (len(times), 1, 1))
         T[:, :3, :3] = turns.as_matrix() @ start[:3, :3]
         arm = start[:3, 3] - point if self.angle[i] else np.zeros(3)
-        T[:, :3, 3] = start[:3, 3] - arm + turns.apply(arm) + instants[:, None] * self.travel[i]
+        T[:, :3, 3] = start[:3, 3] - arm + turns.apply(arm) + times[:, None] * self.travel[i]
         return np.asarray(signed_distances(self.shapes.groove(k), self.shapes.wire(k), T, workers=1))
 
     def scene(self) -> Array:
@@ -89,14 +89,14 @@ class Motions(Rows):
 
 def through(
     cases: Cases,
-    instant: ArrayLike,
+    time: ArrayLike,
     *,
     travel: ArrayLike,
     angle: ArrayLike = 0.0,
     point: ArrayLike = 0.0,
     axis: ArrayLike = (0.0, 0.0, 1.0),
 ) -> Motions:
-    """Motions that are at the poses of ``cases`` at ``instant`` (n,), from columns that are spread to n rows.
+    """Motions that are at the poses of ``cases`` at ``time`` (n,), from columns that are spread to n rows.
 
     ``travel`` is (n, 3) mm, or (n,) along the axis.
     """
@@ -108,10 +108,10 @@ def through(
     axis = np.asarray(unit_rows(spread(axis, 3)), np.float64)
     travel = np.asarray(travel, np.float64)
     travel = spread(travel, 3) if travel.ndim == 2 else spread(travel)[:, None] * axis
-    instant, angle, point = spread(instant), spread(angle), spread(point, 3)
-    motions = Motions(cases.shapes, cases.shape, cases.T_groove_wire, point, axis, angle, travel, instant, np.arange(n))
+    time, angle, point = spread(time), spread(angle), spread(point, 3)
+    motions = Motions(cases.shapes, cases.shape, cases.T_groove_wire, point, axis, angle, travel, time, np.arange(n))
     for i in range(n):
-        motions.start[i] = motions.motion(i).at(-float(instant[i]), motions.start[i])
+        motions.start[i] = motions.motion(i).at(-float(time[i]), motions.start[i])
     return motions
 
 
@@ -178,25 +178,25 @@ def _thin(rng: np.random.Generator, n: int) -> Motions:
 
 
 def least_distance(cases: Motions, i: int, end: float = 1.0, named: tuple[float, ...] = ()) -> tuple[float, float]:
-    """Least signed distance (mm) of case i until the instant ``end``, and its instant; see the module."""
+    """Least signed distance (mm) of case i until the time ``end``, and its time; see the module."""
     k = int(cases.shape[i])
     ends = (cases.start[i, :3, 3] + t * cases.start[i, :3, 2] for t in (-0.5, 0.5 * float(cases.shapes.length[k])))
     speed = cases.motion(i).speed(np.array([*ends, cases.start[i, :3, 3]]))
     speed += abs(float(cases.angle[i])) * float(cases.shapes.length[k])
-    hints = [t for t in (float(cases.instant[i]), *named) if 0.0 <= t <= end]
-    width = end / (_INSTANTS - 1)
-    instants = np.array([*np.linspace(0.0, end, _INSTANTS), *hints])
-    best, best_instant = np.inf, 0.0
+    hints = [t for t in (float(cases.time[i]), *named) if 0.0 <= t <= end]
+    width = end / (_TIMES - 1)
+    times = np.array([*np.linspace(0.0, end, _TIMES), *hints])
+    best, best_time = np.inf, 0.0
     while True:
-        values = cases.distances(i, instants)
+        values = cases.distances(i, times)
         lowest = int(values.argmin())
-        best, best_instant = min((best, best_instant), (float(values[lowest]), float(instants[lowest])))
+        best, best_time = min((best, best_time), (float(values[lowest]), float(times[lowest])))
         near = np.flatnonzero(values - speed * width < best)
         if speed * width <= 1e-13 * float(cases.shapes.size()[k]) or not len(near):
-            return best, best_instant
+            return best, best_time
         near = near[np.argsort(values[near], kind="stable")[:_KEPT]]
         width *= 0.5
-        instants = np.unique(np.clip(instants[near, None] + width * np.array([-1.0, 1.0]), 0.0, end))
+        times = np.unique(np.clip(times[near, None] + width * np.array([-1.0, 1.0]), 0.0, end))
 
 
 class CasMethod:
@@ -235,11 +235,11 @@ class SteppedMethod:
     measures: Measures = "depth"
 
     def __init__(self, steps: int) -> None:
-        self.instants = np.linspace(0.0, 1.0, steps + 1)
+        self.times = np.linspace(0.0, 1.0, steps + 1)
 
     def measure(self, cases: Motions) -> Measured:
         """See `Method`."""
-        least = np.array([cases.distances(i, self.instants).min() for i in range(len(cases))])
+        least = np.array([cases.distances(i, self.times).min() for i in range(len(cases))])
         return Measured(least, np.full(len(cases), np.nan))
 
 
@@ -254,10 +254,10 @@ METHODS: Methods = {
 
 @dataclass(frozen=True, slots=True)
 class Truths:
-    """Least distances (n,) mm of all cases, their ``instant`` (n,), and what the reference method said."""
+    """Least distances (n,) mm of all cases, their ``time`` (n,), and what the reference method said."""
 
     distance: Array
-    instant: Array
+    time: Array
     reference: CasMethod
     answers: Answers
 
@@ -272,16 +272,16 @@ class MotionFamily(Family):
         super().__init__(name, about, make)
 
     def truths(self, cases: Motions) -> Truths:
-        """See the module: instants that the reference names are looked at too."""
+        """See the module: times that the reference names are looked at too."""
         reference = CasMethod()
         answers = run_here(reference, cases)
         least = [least_distance(cases, i, named=(reference.lowest.get(i, -1.0),)) for i in range(len(cases))]
-        distance, instant = np.array(least).T
-        return Truths(distance, instant, reference, answers)
+        distance, time = np.array(least).T
+        return Truths(distance, time, reference, answers)
 
     def difference(self, cases: Motions, truths: Truths, i: int) -> float:
-        """See `Family`: at 50 digits of the pose at the instant that was found."""
-        T = cases.motion(i).at(float(truths.instant[i]), cases.start[i])
+        """See `Family`: at 50 digits of the pose at the time that was found."""
+        T = cases.motion(i).at(float(truths.time[i]), cases.start[i])
         pose = Cases(cases.shapes, cases.shape[i : i + 1], T[None], np.full(1, np.nan))
         return abs(float(truth_50_digits(pose, 0)) - float(truths.distance[i])) / float(cases.scene()[i])
 
@@ -299,19 +299,19 @@ class MotionFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        distance, instant = least_distance(cases, i)
-        return f"{cases.snippet(i)}\n# truth: least {distance!r} mm at instant {instant!r}"
+        distance, time = least_distance(cases, i)
+        return f"{cases.snippet(i)}\n# truth: least {distance!r} mm at t = {time!r}"
 
 
 def check_first_contacts(cases: Motions, truths: Truths) -> None:
     """Count each wrong answer of `first_contact` as a failure of its case.
 
-    It must touch if and only if the truth does (unless that is within the bound of 0); the instant that it names must
+    It must touch if and only if the truth does (unless that is within the bound of 0); the time that it names must
     be one of contact, with no contact before it: the least distance of the motion that ends there is 0, within the
     bound, or the start is in contact.
     """
     answers = truths.answers
-    for i, (touches, instant, value) in truths.reference.first.items():
+    for i, (touches, time, value) in truths.reference.first.items():
         least, bound = float(truths.distance[i]), float(answers.bound[i])
         flaw = ""
         if touches and least > bound:
@@ -320,9 +320,9 @@ def check_first_contacts(cases: Motions, truths: Truths) -> None:
             flaw = "a hit missed"
         elif not touches and not abs(value - float(answers.distance[i])) <= bound:
             flaw = "it and min_clearance differ"
-        elif touches and float(cases.distances(i, np.array([instant]))[0]) > bound:
+        elif touches and float(cases.distances(i, np.array([time]))[0]) > bound:
             flaw = "not yet in contact"
-        elif touches and instant > 0.0 and least_distance(cases, i, instant, (instant,))[0] < -bound:
+        elif touches and time > 0.0 and least_distance(cases, i, time, (time,))[0] < -bound:
             flaw = "in contact before"
         if flaw:
             answers.failed[i] = True

@@ -41,25 +41,25 @@ def _row(method: str, one: float, worst: float, setting: float | None = None) ->
 
 
 def test_cas_is_exact_to_rounding_and_never_wrong() -> None:
-    found = measure(Method("cas"), budget=QUICK)
-    assert found.poses == 420
-    assert found.worst_error < 1e-14
-    assert found.depth_error is not None
-    assert found.depth_error < 1e-14
-    assert [(b.free, b.hits, b.false_hits, b.false_misses) for b in found.bands] == [(40, 40, 0, 0)] * 3
-    assert 0.0 < found.many < found.one
+    row = measure(Method("cas"), budget=QUICK)
+    assert row.poses == 420
+    assert row.worst_error < 1e-14
+    assert row.depth_error is not None
+    assert row.depth_error < 1e-14
+    assert [(b.free, b.hits, b.false_hits, b.false_misses) for b in row.bands] == [(40, 40, 0, 0)] * 3
+    assert 0.0 < row.many < row.one
 
 
 @pytest.mark.parametrize("method", [Method("chords", 5.0), Method("wedges", 10.0), Method("mesh", 0.05)])
 def test_faceted_methods_err_by_their_chords_and_only_to_the_safe_side(method: Method) -> None:
-    found = measure(method, budget=QUICK)
+    row = measure(method, budget=QUICK)
     angle = {"chords": 5.0, "wedges": 10.0, "mesh": 10.0}[method.family]
     limit = chord_error(math.radians(angle))
-    assert 0.9 * limit < found.worst_error < limit + 1e-6
-    nearest = found.bands[-1]
+    assert 0.9 * limit < row.worst_error < limit + 1e-6
+    nearest = row.bands[-1]
     assert nearest.false_hits == nearest.free  # a chord error from contact all that is free looks like a hit
-    assert all(b.false_misses == 0 for b in found.bands)
-    assert found.poses == (210 if method.family == "chords" else 420)
+    assert all(b.false_misses == 0 for b in row.bands)
+    assert row.poses == (210 if method.family == "chords" else 420)
 
 
 points = st.lists(
@@ -77,10 +77,10 @@ def test_front_is_what_nothing_beats(values: list[tuple[float, float]]) -> None:
 
 
 def test_a_job_answers_as_the_process_itself_would() -> None:
-    found = run_job("contact", Method("chords", 40.0), time_limit=60.0)
+    row = run_job("contact", Method("chords", 40.0), time_limit=60.0)
     here = dataclasses.asdict(measure(Method("chords", 40.0), budget=QUICK))
     for name in ("worst_error", "median_error", "depth_error", "pieces", "label"):
-        assert getattr(found, name) == here[name]
+        assert getattr(row, name) == here[name]
 
 
 def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,13 +106,13 @@ def test_every_series_measures_the_same_groove(family: str) -> None:
     if family in missing_peers():
         pytest.skip(f"{family} is not installed")
     method = Method(family) if family in EXACT else Method(family, 5.0)
-    found = measure(method, load=load_peer, prepare=prepare_peer, budget=QUICK)
-    assert (found.depth_error is None) == (family in SHALLOW)
+    row = measure(method, load=load_peer, prepare=prepare_peer, budget=QUICK)
+    assert (row.depth_error is None) == (family in SHALLOW)
     if family in EXACT:
-        assert found.error < 1e-12
+        assert row.error < 1e-12
     elif family != "fcl":  # in millimetres, FCL's own tolerance now and then costs a whole millimetre
-        assert 0.9 * 0.0114 < found.error < 1.002 * 0.01143  # facets of the groove; the wire has none
-    assert found.bands[0].false_misses == 0
+        assert 0.9 * 0.0114 < row.error < 1.002 * 0.01143  # facets of the groove; the wire has none
+    assert row.bands[0].false_misses == 0
 
 
 def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
@@ -176,14 +176,14 @@ def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.
     monkeypatch.setattr(study, "run_job", answer)
     monkeypatch.setattr(study, "missing_peers", lambda: {"coal-sector": "not installed: pip install coal"})
     steps: list[tuple[int, int]] = []
-    found = compare(peers=True, progress=lambda done, total, what: steps.append((done, total)))
-    assert [row.label for row in found.contact] == [m.label for m in METHODS]
-    assert {r.reason for r in found.contact if isinstance(r, NotMeasured)} == {"crashed (SIGABRT)"}
-    assert {r.method for r in found.peers if isinstance(r, NotMeasured)} == {"coal-sector"}
+    comparison = compare(peers=True, progress=lambda done, total, what: steps.append((done, total)))
+    assert [row.label for row in comparison.contact] == [m.label for m in METHODS]
+    assert {r.reason for r in comparison.contact if isinstance(r, NotMeasured)} == {"crashed (SIGABRT)"}
+    assert {r.method for r in comparison.peers if isinstance(r, NotMeasured)} == {"coal-sector"}
     assert not any(method == "coal-sector" for _, method in jobs)
     assert steps[-1][0] == steps[-1][1]
     assert steps == sorted(steps)
-    assert len(found.assemblies) == len(study.ASSEMBLIES)
+    assert len(comparison.assemblies) == len(study.ASSEMBLIES)
     jobs.clear()
     compare()
     assert not any(kind == "peer" for kind, _ in jobs)

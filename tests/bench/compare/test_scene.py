@@ -47,5 +47,5 @@ def test_tilted_distances_are_those_of_the_search() -> None:
     for i in np.flatnonzero(~POSES.parallel)[::52]:
         c, d = oracle.axis_of(POSES.T[i])
         value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)
-        known = mpmath.mpf(float(POSES.distance[i])) + mpmath.mpf(float(POSES.residual[i]))
-        assert abs(mpmath.mpf(value) - known) < mpmath.mpf(10) ** -22
+        stored = mpmath.mpf(float(POSES.distance[i])) + mpmath.mpf(float(POSES.residual[i]))
+        assert abs(mpmath.mpf(value) - stored) < mpmath.mpf(10) ** -22

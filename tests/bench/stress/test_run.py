@@ -144,8 +144,8 @@ def test_a_method_that_ends_the_interpreter_is_counted():
 
 
 def test_names_and_numbers_are_checked():
-    known = ", ".join([*KINDS, *list(POSES)[:2]])
-    with pytest.raises(InputError, match=f"unknown family 'x'; available: {known}"):
+    available = ", ".join([*KINDS, *list(POSES)[:2]])
+    with pytest.raises(InputError, match=f"unknown family 'x'; available: {available}"):
         run_stress(["x"])
     with pytest.raises(InputError, match="unknown method 'x'; available: cas"):
         run_stress(methods=["x"])

@@ -26,8 +26,8 @@ def powers(rng: np.random.Generator, n: int, low: float, high: float, zeros: flo
     return np.where(rng.random(n) < zeros, 0.0, x)
 
 
-def shapes(rng: np.random.Generator, k: int, **given: ArrayLike) -> Shapes:
-    """k grooves and wires of clamp-like proportions; ``given`` replaces any of the columns."""
+def shapes(rng: np.random.Generator, k: int, **fixed: ArrayLike) -> Shapes:
+    """k grooves and wires of clamp-like proportions; ``fixed`` replaces any of the columns."""
     R = 10.0 ** rng.uniform(0.0, 2.0, k)
     columns: dict[str, Any] = {
         "R": R,
@@ -36,7 +36,7 @@ def shapes(rng: np.random.Generator, k: int, **given: ArrayLike) -> Shapes:
         "r": R * rng.uniform(0.3, 0.999, k),
         "length": R * 10.0 ** rng.uniform(-0.5, 1.5, k),
     }
-    columns.update({name: np.broadcast_to(np.asarray(value, np.float64), (k,)) for name, value in given.items()})
+    columns.update({name: np.broadcast_to(np.asarray(value, np.float64), (k,)) for name, value in fixed.items()})
     arrays: dict[str, Any] = {name: np.ascontiguousarray(value) for name, value in columns.items()}
     return Shapes(**arrays)
 
@@ -52,15 +52,15 @@ def count(n: int) -> int:
 
 
 def setting(
-    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **given: ArrayLike
+    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **fixed: ArrayLike
 ) -> tuple[Shapes, NDArray[np.intp], NDArray[np.str_]]:
     """Random shapes, the shape (n,) of each case, and the feature (n,) that it touches."""
-    return *shapes_for(rng, n, **given), rng.choice(features, n)
+    return *shapes_for(rng, n, **fixed), rng.choice(features, n)
 
 
-def shapes_for(rng: np.random.Generator, n: int, **given: ArrayLike) -> tuple[Shapes, NDArray[np.intp]]:
+def shapes_for(rng: np.random.Generator, n: int, **fixed: ArrayLike) -> tuple[Shapes, NDArray[np.intp]]:
     """Random shapes for n cases, and the shape (n,) of each case."""
-    drawn = shapes(rng, count(n), **given)
+    drawn = shapes(rng, count(n), **fixed)
     return drawn, spread(n, len(drawn))
 
 
@@ -79,7 +79,7 @@ def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Ar
 
 
 def free(rng: np.random.Generator, shapes: Shapes, shape: NDArray[np.intp], centre: Any, direction: Any) -> Cases:
-    """Cases that were built from no answer: wires with their middles and axes (n, 3) as given."""
+    """Cases that were built from no answer: wires with their middles and axes (n, 3) as fixed."""
     return Cases(shapes, shape, poses_from_axes(rng, centre, direction), np.full(len(shape), np.nan))
 
 

@@ -143,4 +143,4 @@ class FlatFamily(Family):
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 
-FLATS = {name: FlatFamily(name, *made) for name, made in MAKERS.items()}
+FLATS = {name: FlatFamily(name, *maker) for name, maker in MAKERS.items()}
