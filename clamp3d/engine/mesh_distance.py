@@ -22,8 +22,8 @@ Enough = Callable[[Distance], bool]
 
 _MOST_POINTS = 400
 """Vertices of a mesh, spread over it, that are tried as points inside another one."""
-_CUTS, _FEW_CUTS = 60_000, 2_000
-"""Triangles that those of an overlap are cut into beyond their number, to bound its thickness: tenths of a second, or
+_CUTS, _FEW_CUTS = 100_000, 2_000
+"""Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much
 less where Open CASCADE can be asked instead.
 """
 _HALVINGS = 30

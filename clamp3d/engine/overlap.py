@@ -18,6 +18,8 @@ _INNER = 40
 """Triangles of an overlap under which a point is tried."""
 _CORNERS = 400
 """Corners of an overlap that are measured."""
+_NO_FURTHER = 1e-3
+"""Relative to the greatest distance that was measured: a bound larger by less is sharp."""
 _HAIR = 1e-9
 """Relative to the size: a piece that reaches over a border by less is not cut there."""
 
@@ -148,7 +150,12 @@ def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int) -> Ite
     pieces = Pieces.of(a, b, triangles, back)
     yield pieces
     while pieces.at_most.max(initial=0.0) > 0.0:
-        furthest = pieces.at_most.max(axis=1) > 0.5 * pieces.at_most.max()
+        # What is no further than a middle that was measured cannot be the furthest.
+        furthest = pieces.at_most.max(axis=1) > max(
+            0.5 * pieces.at_most.max(), (1.0 + _NO_FURTHER) * pieces.middles.max()
+        )
+        if not furthest.any():
+            return
         most -= 2 * int(furthest.sum())  # three or four in place of one
         if most < 0:
             return

@@ -14,6 +14,7 @@ from shapely import Polygon
 from clamp3d.engine.check import check
 from clamp3d.engine.mesh_distance import meshes_distance
 from clamp3d.engine.model import ModelCache
+from clamp3d.engine.overlap import common, cut_up
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.surface import Surface, at_edges
 from clamp3d.engine.verdict import Verdict
@@ -121,3 +122,14 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.verdict is Verdict.CLASH
     assert -0.100001 <= row.distance.lower <= row.distance.upper <= -0.07
     assert row.distance.upper - row.distance.lower <= 0.01
+
+
+def test_an_overlap_is_cut_up_only_until_its_thickness_is_known():
+    """A slab of constant thickness: no triangle can be shown to be thinner than the middles that were measured."""
+    ring = trimesh.creation.annulus(3.0, 10.0, 3.0, sections=24)
+    a = Surface(ring.vertices, ring.faces)
+    T = translation(0.3, 0.2, 3.0 - 0.02)
+    shared = common(a, a, T)
+    *_, last = cut_up(a, a, T, shared.vertices[shared.faces], 200_000)
+    assert last.at_most.max() == pytest.approx(0.02, rel=2e-3)
+    assert len(last.triangles) < 20_000
