@@ -128,6 +128,8 @@ class PageServer:
             self._thread.join()
             self.work.shutdown(cancel_futures=True)
             self._thread = None
+        for own in self._sockets:
+            own.close()
 
 
 class _Handler(RequestHandler):
@@ -177,8 +179,8 @@ class _Answer(_Handler):
         query = {key: self.get_argument(key) for key in self.request.arguments}
         try:
             self.write(await asyncio.get_running_loop().run_in_executor(self.own_server.work, self.answer, query))
-        except Clamp3dError as error:
-            self.set_status(400)
+        except Exception as error:  # a question that fails is not the end of the page
+            self.set_status(400 if isinstance(error, Clamp3dError) else 500)
             self.write({"error": str(error)})
 
 

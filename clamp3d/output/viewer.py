@@ -320,11 +320,12 @@ def view(
         result = check(result)
     source = ClampStory(result.clamp, result.model) if isinstance(result, Assembly) else result.scene
     server = MeshcatServer(url) if url is not None else PageServer(host, port) if serve else None
-    viewer = Viewer(source, server, mesh_error=mesh_error, overlays=overlays)
     try:
+        viewer = Viewer(source, server, mesh_error=mesh_error, overlays=overlays)
         viewer.finish(result)
     except BaseException:
-        viewer.close()
+        if isinstance(server, PageServer):
+            server.close()
         raise
     return viewer
 

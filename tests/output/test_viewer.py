@@ -410,6 +410,9 @@ def test_colours_of_verdicts_differ_for_colour_blind_readers(eyes):
 def test_port_that_is_taken_is_an_error_that_says_so():
     with serve() as first, pytest.raises(InputError, match=f"port {first.port}.*leave --port out"):
         PageServer(port=first.port)
+    with pytest.raises(InputError, match="mesh_error"):
+        view(plate_and_pin(), mesh_error=-1.0, port=first.port)
+    PageServer(port=first.port).close()  # neither holds it any more
 
 
 def test_a_bad_question_is_answered_with_what_is_wrong():
