@@ -35,7 +35,7 @@ def percent(rate: float) -> str:
 def _rate(outcome: Outcome) -> str:
     rate = outcome.failure_rate
     if rate is None:
-        return "refused" if outcome.refused else "not asked"
+        return "refused" if outcome.refused else "not run"
     return f"{percent(rate)} of {outcome.asked - outcome.refused}"
 
 
@@ -59,7 +59,7 @@ _MATRICES = (
 
 def table(run: StressRun) -> str:
     """One line per family and method, fixed width."""
-    head = ["family", "method", "asked", "refused", "false hit", "false miss", "> bound", "worst mm", "median"]
+    head = ["family", "method", "cases", "refused", "false hit", "false miss", "> bound", "worst mm", "median"]
     rows = []
     for o in run.outcomes:
         troubles = ((o.exceptions, "raised"), (o.crashes, "crashed"), (o.timeouts, "timed out"))

@@ -35,10 +35,6 @@ def distance_less(part: Any, wire: Any, radius: float, *, depth: bool) -> Prepar
     return ready(one, 1, depth=depth)
 
 
-def _block() -> Any:
-    return solid(block()).Moved(location(inverse(pair().T_a_groove)))
-
-
 def axis(length: float) -> Any:
     """A wire's axis."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
@@ -69,7 +65,8 @@ def _near() -> Any:
         plane = surface.Plane()
         return abs(plane.Axis().Direction().Y()) > 0.5 and bool(plane.Location().Y() > -GROOVE.radius)
 
-    return together(filter(near, explore(_block(), "FACE")))
+    placed = solid(block()).Moved(location(inverse(pair().T_a_groove)))
+    return together(filter(near, explore(placed, "FACE")))
 
 
 def _arcs(_: float) -> Prepared:
