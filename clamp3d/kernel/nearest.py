@@ -33,9 +33,9 @@ class Answer(NamedTuple):
 
 
 @inlined
-def is_parallel(groove: Groove, rod: Rod, reach: float) -> bool:
-    """Whether an axis that reaches so far counts as parallel to the groove."""
-    return rod.e2 * (reach * reach) <= (PARALLEL * groove.R) * (PARALLEL * groove.R)
+def is_parallel(groove: Groove, rod: Rod) -> bool:
+    """Whether an axis counts as parallel to the groove."""
+    return rod.e2 * (rod.half * rod.half) <= (PARALLEL * groove.R) * (PARALLEL * groove.R)
 
 
 @inlined
@@ -258,7 +258,7 @@ def normal_of_edge(groove: Groove, rod: Rod, best: Candidate, bound: float) -> V
 @inlined
 def nearest(groove: Groove, rod: Rod) -> Answer:
     """Signed distance of a capsule: of its axis, less its radius."""
-    if is_parallel(groove, rod, rod.half):
+    if is_parallel(groove, rod):
         return parallel(groove, rod)
     if rod.centre.y - rod.half * abs(rod.axis.y) <= groove.h:
         lo, hi = features.clip(groove, rod, rod.half)

@@ -155,14 +155,14 @@ def free_gap(groove: Groove, rod: Rod, piece: int) -> Gap:
     """Gap of a piece without regard to sign."""
     H, half, z, dz = groove.H, rod.half, rod.centre.z, rod.axis.z
     best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
-    if is_parallel(groove, rod, half):  # one point of the stretch next to the piece, or the nearer end
+    if is_parallel(groove, rod):  # one point of the stretch next to the piece, or the nearer end
         middle = 0.5 * (max(z - half, -H) + min(z + half, H))
         t = ((end_of(piece) * H if piece >= END_BELOW else middle) - z) / dz
         if abs(t) <= half:
             best = on_piece_at(groove, rod, piece, t, best)
     best = on_piece_at(groove, rod, piece, -half, best)
     best = on_piece_at(groove, rod, piece, half, best)
-    if not is_parallel(groove, rod, half):
+    if not is_parallel(groove, rod):
         if piece == ARC_SURFACE:
             best = on_back_of_arc(groove, rod, best)
         best = on_edges(groove, rod, piece, best)

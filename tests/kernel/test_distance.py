@@ -135,6 +135,8 @@ def test_tiny_and_huge_numbers():
             assert answer.distance == 7.0
             assert abs(np.linalg.norm(answer.normal) - 1.0) < 1e-14
             assert abs(np.linalg.norm(answer.point_on_groove[:2]) - 12.0) < 1e-13
+            ended = signed_distance(groove, Cylinder(5.0, 20.0), translation(0.0, 0.0, 36.0) @ T)  # 1 mm before the end
+            assert ended.distance == pytest.approx(math.hypot(7.0, 1.0), abs=1e-13)
         # On the major axis of the end arcs but for a hair: the stationary points of a tilted axis run together.
         tilted = rotation((1, 0, 0), 0.3)
         tilted[:3, 3] = (tiny, 25.0 * math.tan(-0.3) + tiny, 25.0)
