@@ -137,25 +137,7 @@ def accept(search: Search, region: Region) -> bool:
     if sagitta(axis.radius, arc) < 6.0 * noise or arc < 2.0 * np.median(spans):
         return False
     length = float(np.ptp((V[np.unique(search.surface.F[region.faces])]) @ axis.direction))
-    if _runs_on(search.surface, region, length) or _bent(p, axis.residual(V[region.points]), axis.radius):
-        return False
-    return len(region.points) >= 8 and length > 0.0
-
-
-def _bent(local: Array, residual: Array, radius: float) -> bool:
-    """True if a loose fit (over 1 % of the radius) is loose because the shape is bent, oval or a barrel.
-
-    Points ``local`` (n, 3) in the cylinder's own frame. Scatter leaves nothing for a smooth second-order correction to
-    explain; another shape lets it explain more than half.
-    """
-    power = float(residual @ residual)
-    if np.sqrt(power / len(residual)) <= 0.01 * radius or len(residual) < 12:
-        return False
-    r = np.hypot(local[:, 0], local[:, 1])
-    x, y, z = local[:, 0] / r, local[:, 1] / r, local[:, 2] - local[:, 2].mean()
-    A = np.column_stack([np.ones_like(x), x, y, z, z * x, z * y, z * z, z * z * x, z * z * y, x * y, x * x])
-    left = residual - (A @ np.linalg.lstsq(A, residual, rcond=1e-9)[0])
-    return float(left @ left) / power < 0.5 - 5.0 / len(residual)
+    return len(region.points) >= 8 and length > 0.0 and not _runs_on(search.surface, region, length)
 
 
 def _runs_on(surface: Surface, region: Region, length: float) -> bool:
