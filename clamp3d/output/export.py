@@ -13,7 +13,7 @@ from clamp3d import checks
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.states import state as find_state
-from clamp3d.engine.result import CheckResult
+from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.files.formats import UNITS_MM
@@ -141,17 +141,18 @@ def export(
 
 
 def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Iterator[PlacedPart]:
-    """The parts in the colours that their files state, those with a finding in the program's.
+    """The parts in the colours that their files state, those that clash in the program's.
 
     Where a file states none, equal parts have one colour.
     """
-    findings = {name for row in (result.findings if result else ()) for name in (row.a, row.b)}
+    clashes = [row for row in (result.rows if result else ()) if row.verdict in BAD]
+    clashing = {name for row in clashes for name in (row.a, row.b)}
     colours: dict[int, str] = {}
     for item in placed:
         component = item.component
         if component is None:
             yield item
-        elif item.name in findings:
+        elif item.name in clashing:
             yield replace(item, component=replace(component, face_colours={}))
         else:
             yield replace(item, colour=component.colour or colours.setdefault(id(item.shape), item.colour))

@@ -81,7 +81,7 @@ def test_tree_names_colours_and_instances_stay(machine, tmp_path):
     assert [part.name for part in load(tmp_path / "again.step").parts] == [part.name for part in scene.parts]
 
 
-def test_parts_with_a_finding_have_the_programs_colour(machine, tmp_path):
+def test_parts_that_clash_have_the_programs_colour(machine, tmp_path):
     scene = load(machine)
     place = {part.name: part.T_world for part in scene.parts}
     result = check(scene.moved({"pin_1": place["plate_1"]}))
@@ -96,6 +96,15 @@ def test_parts_with_a_finding_have_the_programs_colour(machine, tmp_path):
     assert (after["pin_2"].colour, after["pin_4"].colour) == (GREEN, BLUE)
     assert (after["plate_1"].face_colours, after["plate_2"].face_colours) == ([], [RED])
     np.testing.assert_allclose(after["pin_1"].T, place["plate_1"][:3], atol=1e-9)
+
+
+def test_parts_that_only_touch_keep_their_colours(machine, tmp_path):
+    scene = load(machine)
+    place = {part.name: part.T_world for part in scene.parts}
+    result = check(scene.moved({"pin_1": place["pin_4"] @ translation(0, 0, 10)}))
+    assert result.verdict("pin_1", "pin_4").value == "contact"
+    after = by_name(export(result, tmp_path / "touching.step").files[0])
+    assert (after["pin_1"].colour, after["pin_4"].colour) == (GREEN, BLUE)
 
 
 def test_a_chosen_part_and_a_part_of_one_product(machine, tmp_path):
