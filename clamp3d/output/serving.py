@@ -44,7 +44,7 @@ class CommandLog:
 
     >>> log = CommandLog()
     >>> for x in (1.0, 2.0):
-    ...     log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
+    ...     _ = log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
     >>> len(log.messages())
     1
     """
