@@ -28,6 +28,7 @@ from clamp3d.errors import InputError
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
     from clamp3d.engine.allowed import Allowed
+    from clamp3d.engine.scene import Scene
 
 BCF = Output((".bcfzip", ".bcf"))
 
@@ -95,20 +96,11 @@ def command(
     are no two parts.
     """
     from clamp3d.engine.check import check
-    from clamp3d.engine.scene import Scene
     from clamp3d.output.baseline import compare, groups_csv
     from clamp3d.output.groups import accepted_file, grouped, read_accepted
     from clamp3d.output.scene_report import check_to_dict, check_to_text
 
-    loaded = source.load()
-    run: Assembly | None = None
-    if isinstance(loaded, Scene):
-        scene = loaded
-    else:
-        from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
-
-        run = assemble(loaded)
-        scene = run.scene
+    scene, run = _scene(source)
     clearance = scene.clearance if clearance is None else clearance
     scene = replace(scene, clearance=clearance, allowed=(*scene.allowed, *allow))
     accepted = read_accepted(accepted_file(source.source))
@@ -134,6 +126,19 @@ def command(
     finish(run is not None and not run.passed, verdicts={group.verdict for group in comparison.open(groups)})
     if not result.work.pairs:
         raise InputError("there is no pair of parts to judge")
+
+
+def _scene(source: Source) -> tuple[Scene, Assembly | None]:
+    """The scene to check, and the clamp that it is of."""
+    from clamp3d.engine.scene import Scene
+
+    loaded = source.load()
+    if isinstance(loaded, Scene):
+        return loaded, None
+    from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
+
+    run = assemble(loaded)
+    return run.scene, run
 
 
 @declared("accept")

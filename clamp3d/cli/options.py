@@ -160,6 +160,7 @@ def complete_inputs(context: click.Context, parameter: click.Parameter, incomple
 
 
 QUIET = option("No progress.", "--quiet", "-q")
+CLEARANCE = option("Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM")
 JSON = option("Write the result as JSON; - is stdout.", "--json")
 
 
@@ -296,9 +297,7 @@ class Viewing:
         metavar="NAME[=SIZE]",
     )
     draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
-    clearance: float | None = option(
-        "Gap from which parts are clear.  [default: 5 for a clamp; the scene's own]", metavar="MM"
-    )
+    clearance: float | None = CLEARANCE
 
 
 VIEWING = group(Viewing)

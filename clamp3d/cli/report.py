@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clamp3d.cli.options import FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
+from clamp3d.cli.options import CLEARANCE, FOLDER, METHOD, QUIET, SOURCE, Method, Source, declared, option
 from clamp3d.cli.progress import narrated, narrator
 from clamp3d.cli.terminal import finish, show
 from clamp3d.errors import need
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 def command(
     source: Source = SOURCE,
     method: Method = METHOD,
-    clearance: float | None = option(
-        "Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM"
-    ),
+    clearance: float | None = CLEARANCE,
     output: Path = option("Folder for the three files.", "--output", "-o", type=FOLDER, required=True, metavar="DIR"),
     quiet: bool = QUIET,
 ) -> None:
@@ -33,15 +31,12 @@ def command(
     """
     need("matplotlib", "a report")
     from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.clamp.scene import CONTACT
-    from clamp3d.engine.verdict import Thresholds
     from clamp3d.output.files import check_folder
     from clamp3d.output.report import make_report
     from clamp3d.output.report_page import write_report
 
     settings = method.settings()
     check_folder(output)
-    Thresholds(CONTACT, clearance or 0.0)
     loaded = source.load()
     if isinstance(loaded, Clamp):
         subject: Assembly | Scene = narrated(loaded, method.model(loaded, quiet=quiet), settings, quiet)

@@ -7,7 +7,7 @@ import uuid
 import zipfile
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, tostring
 
 from clamp3d.engine.result import CheckResult
 from clamp3d.geometry.pose import Array
@@ -38,9 +38,7 @@ def write_bcf(result: CheckResult, path: Path) -> None:
             entry = zipfile.ZipInfo(name, now().timetuple()[:6])
             package.writestr(entry, data, zipfile.ZIP_DEFLATED)
 
-        version = Element("Version", VersionId="2.1")
-        SubElement(version, "DetailedVersion").text = "2.1"
-        add("bcf.version", _xml(version))
+        add("bcf.version", _xml(_element("Version", _element("DetailedVersion", "2.1"), VersionId="2.1")))
         for index, group in enumerate(grouped(result)[:_TOPICS]):
             guid = _guid(group, "topic")
             add(f"{guid}/markup.bcf", _xml(_markup(result, group, index)))
@@ -53,49 +51,56 @@ def write_bcf(result: CheckResult, path: Path) -> None:
 def _markup(result: CheckResult, group: Group, index: int) -> Element:
     """The topic in words, and the names of its files."""
     names = titles(result.scene)
-    markup = Element("Markup")
-    attributes = {"TopicType": group.verdict.value, "TopicStatus": "Open"}
-    topic = SubElement(markup, "Topic", {"Guid": _guid(group, "topic"), **attributes})
     pairs = ", ".join(f"{row.a} and {row.b}" for row in group.rows)
-    fields = {
-        "Title": group_sentence(group, names),
-        "Index": str(index),
-        "Labels": group.id,
-        "CreationDate": f"{now():%Y-%m-%dT%H:%M:%SZ}",
-        "CreationAuthor": _SYSTEM,
-        "Description": f"{group_text(group, names)}\n{pairs}",
-    }
-    for key, text in fields.items():
-        SubElement(topic, key).text = "".join(c if c.isprintable() or c == "\n" else " " for c in text)
-    viewpoints = SubElement(markup, "Viewpoints", Guid=_guid(group, "viewpoint"))
-    SubElement(viewpoints, "Viewpoint").text = "viewpoint.bcfv"
-    SubElement(viewpoints, "Snapshot").text = "snapshot.png"
-    return markup
+    topic = _element(
+        "Topic",
+        _element("Title", group_sentence(group, names)),
+        _element("Index", str(index)),
+        _element("Labels", group.id),
+        _element("CreationDate", f"{now():%Y-%m-%dT%H:%M:%SZ}"),
+        _element("CreationAuthor", _SYSTEM),
+        _element("Description", f"{group_text(group, names)}\n{pairs}"),
+        Guid=_guid(group, "topic"),
+        TopicType=group.verdict.value,
+        TopicStatus="Open",
+    )
+    files = _element("Viewpoint", "viewpoint.bcfv"), _element("Snapshot", "snapshot.png")
+    return _element("Markup", topic, _element("Viewpoints", *files, Guid=_guid(group, "viewpoint")))
 
 
 def _viewpoint(result: CheckResult, group: Group) -> Element:
     """The parts of the group selected, and a camera that looks at its worst finding."""
-    root = Element("VisualizationInfo", Guid=_guid(group, "viewpoint"))
-    components = SubElement(root, "Components")
-    selection = SubElement(components, "Selection")
-    for name in dict.fromkeys(name for row in group.rows for name in (row.a, row.b)):
-        component = SubElement(selection, "Component")
-        SubElement(component, "OriginatingSystem").text = _SYSTEM
-        SubElement(component, "AuthoringToolId").text = name
-    SubElement(components, "Visibility", DefaultVisibility="true")
+    parts = dict.fromkeys(name for row in group.rows for name in (row.a, row.b))
+    selected = (
+        _element("Component", _element("OriginatingSystem", _SYSTEM), _element("AuthoringToolId", name))
+        for name in parts
+    )
+    components = _element("Selection", *selected), _element("Visibility", DefaultVisibility="true")
     target, towards_viewer, up, size = view_of(result.scene, group.worst)
-    camera = SubElement(root, "PerspectiveCamera")
-    _vector(camera, "CameraViewPoint", (target + 1.5 * size * towards_viewer) * _METRES)
-    _vector(camera, "CameraDirection", -towards_viewer)
-    _vector(camera, "CameraUpVector", up)
-    SubElement(camera, "FieldOfView").text = "45"
-    return root
+    camera = _element(
+        "PerspectiveCamera",
+        _vector("CameraViewPoint", (target + 1.5 * size * towards_viewer) * _METRES),
+        _vector("CameraDirection", -towards_viewer),
+        _vector("CameraUpVector", up),
+        _element("FieldOfView", "45"),
+    )
+    guid = _guid(group, "viewpoint")
+    return _element("VisualizationInfo", _element("Components", *components), camera, Guid=guid)
 
 
-def _vector(parent: Element, name: str, value: Array) -> None:
-    element = SubElement(parent, name)
-    for axis, number in zip("XYZ", value.tolist(), strict=True):
-        SubElement(element, axis).text = repr(number)
+def _vector(name: str, value: Array) -> Element:
+    return _element(name, *(_element(axis, repr(number)) for axis, number in zip("XYZ", value.tolist(), strict=True)))
+
+
+def _element(tag: str, *content: Element | str, **attributes: str) -> Element:
+    """An element with its children or its text, without control characters, which XML forbids."""
+    element = Element(tag, attributes)
+    for item in content:
+        if isinstance(item, str):
+            element.text = "".join(c if c.isprintable() or c == "\n" else " " for c in item)
+        else:
+            element.append(item)
+    return element
 
 
 def _guid(group: Group, kind: str) -> str:

@@ -38,7 +38,7 @@ _DARK = (
     + "}"
 )
 """Colours of a picture on a dark page: what is drawn in ink becomes light, what is white dark."""
-MATRIX = 30
+MATRIX = 12
 """Parts that the page's matrix shows at most."""
 
 
