@@ -47,6 +47,8 @@ class _LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
+            if os.path.exists(cmd_name):
+                raise click.UsageError(f"{cmd_name} is no command; to check it: clamp3d check {cmd_name}", ctx)
             raise click.exceptions.NoSuchCommand(cmd_name, possibilities=COMMANDS, ctx=ctx)
         module, _, function = COMMANDS[cmd_name][0].partition(".")
         command: click.Command = getattr(importlib.import_module(f"clamp3d.cli.{module}"), function)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clamp3d.cli.options import JSON, QUIET, Output, declared, option
 from clamp3d.cli.progress import bar
-from clamp3d.cli.terminal import save, show
+from clamp3d.cli.terminal import command_line, save, show
 
 CHART = Output((".png", ".svg", ".html"))
 
@@ -32,6 +32,4 @@ def command(
     show(comparison_to_text(comparison))
     save(json_file, lambda: comparison_to_dict(comparison))
     if plot_file is not None:
-        save_comparison(
-            comparison, plot_file, "clamp3d compare" + (" --peers" if peers else "") + f" --plot {plot_file.name}"
-        )
+        save_comparison(comparison, plot_file, command_line())

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,16 +32,12 @@ UNITS = ("mm", "cm", "m", "in")
 def number(text: str | float) -> float:
     """A finite number, as the type of an option; ``1/3`` is one too."""
     try:
-        if "/" in str(text):
-            from fractions import Fraction
-
-            text = float(Fraction(text))
-        value = math.nan if "_" in str(text) else float(text)  # 1_0 is no number outside of Python
+        value = float(Fraction(text)) if "/" in str(text) else float(text)
+        if math.isfinite(value) and "_" not in str(text):  # 1_0 is no number outside of Python
+            return value
     except (ValueError, ZeroDivisionError, OverflowError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise click.BadParameter(f"must be a finite number or a fraction like 1/3, got {text!r}")
-    return value
+        pass
+    raise click.BadParameter(f"must be a finite number or a fraction like 1/3, got {text!r}")
 
 
 def radians(text: str | float) -> float:

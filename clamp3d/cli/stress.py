@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from clamp3d.cli.options import JSON, PICTURE, QUIET, declared, group, option
-from clamp3d.cli.terminal import finish, save, show
+from clamp3d.cli.terminal import command_line, finish, save, show
 from clamp3d.errors import InputError
 
 
@@ -42,12 +42,6 @@ class Runs:
         if number >= count:
             raise InputError(f"--case must be less than the number of cases, {count}, got {number}")
         return family.case(count, self.seed, number)
-
-    @property
-    def text(self) -> str:
-        """The command that asks for them."""
-        some = [f' --family "{name}"' for name in self.families] + [f' --method "{name}"' for name in self.methods]
-        return f"clamp3d stress --n {self.n} --seed {self.seed} --check {self.check}{''.join(some)}"
 
 
 @declared("stress")
@@ -94,7 +88,7 @@ def command(
         )
     show(table(result))
     save(json_file, result.to_dict)
-    save(markdown_file, lambda: markdown(result, runs.text))
+    save(markdown_file, lambda: markdown(result, command_line()))
     if plot_file is not None:
         plot(result, plot_file)
     own = [o for o in result.outcomes if o.method == "cas"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Collection
@@ -37,6 +38,11 @@ def show(text: str, *, err: bool = False) -> None:
     taken = context is not None and STDOUT_TAKEN in context.meta
     with suppress(BrokenPipeError):  # `| head`: the exit code is the verdict's all the same
         click.echo(escaped(text, keep="\n"), err=err or taken)
+
+
+def command_line() -> str:
+    """The command that was called, for what is written about its result."""
+    return shlex.join(["clamp3d", *sys.argv[1:]])
 
 
 def save(path: Path | None, make: Callable[[], dict[str, Any] | str]) -> None:

@@ -55,6 +55,8 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
     ("arguments", "message"),
     [
         (["rum"], "No such command 'rum'. Did you mean 'run'?"),
+        (["boxes.toml"], "boxes.toml is no command; to check it: clamp3d check boxes.toml"),
+        (["check", "boxes.toml", "--allow", "glue"], "must be one of running, press, thread, duplicate, got 'glue'"),
         (["run", "nothing"], "unknown clamp 'nothing'; built in: reference"),
         (["run", "--method", "magic"], "'magic' is not one of"),
         (["run", "--unit-angle-deg", "5"], "unit_angle goes with method chords or wedges, got method 'cas'"),
