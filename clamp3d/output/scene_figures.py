@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +25,6 @@ if TYPE_CHECKING:
 
 _MESH_ERROR = 3e-4
 """Chord error of drawn solids, in parts of the scene's extent: below a pixel."""
-_CAMERAS = [
-    Camera(math.radians(azimuth), math.radians(elevation))
-    for elevation, azimuth in itertools.product((24.0, 55.0, -24.0), (32.0, -32.0, 122.0, 212.0))
-]
-"""Where a finding is looked at from, the usual one first."""
 _ENLARGED = 0.12
 """Half the width of an enlargement, in parts of the extent of the two parts."""
 
@@ -44,7 +37,7 @@ def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> 
     figure = blank(9.0, 5.6)
     ax = figure.add_subplot()
     solids = _solids(scene, [part.name for part in scene.parts])
-    raster = draw_solids(ax, list(solids.values()), _CAMERAS[0])
+    raster = draw_solids(ax, list(solids.values()), Camera())
     for number, row in marks:
         place = _place(row)
         if place is not None and row.motion is None:
@@ -59,7 +52,7 @@ def scene_figure(scene: Scene, marks: Sequence[tuple[int, PairResult]] = ()) -> 
 def finding_figure(scene: Scene, row: PairResult) -> Figure:
     """The two parts of a finding, where they stand at its moment: whole, and enlarged about the place.
 
-    What the two have in common is red. Parts that hide the place are ghosts.
+    The parts are ghosts, what the two have in common is red.
     """
     figure = blank(9.0, 4.4)
     shown = _solids(_at(scene, row), [row.a, row.b])
@@ -68,9 +61,7 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
     place = _place(row)
     if place is None and common is not None:
         place = common.world.mean(axis=0)
-    camera = _best_camera(solids, place)
-    is_hidden = place is not None and _hidden(camera, solids, place) > 0
-    inside = [common] if common is not None else [] if is_hidden else None
+    camera = Camera()
     outlines = camera.project(np.vstack([solid.world for solid in solids]))[:, :2]
     low, high = outlines.min(axis=0), outlines.max(axis=0)
     size = float((high - low).max())
@@ -82,7 +73,7 @@ def finding_figure(scene: Scene, row: PairResult) -> Figure:
         windows.append((at - reach, at + reach))
     axes = figure.subplots(1, len(windows), squeeze=False)[0]
     for ax, window in zip(axes, windows, strict=True):
-        draw_solids(ax, solids, camera, pixels=800, window=window, inside=inside)
+        draw_solids(ax, solids, camera, pixels=800, window=window, inside=[] if common is None else [common])
         if place is not None:
             _mark(ax, camera, place, row)
     if place is not None:
@@ -99,13 +90,8 @@ def view_of(scene: Scene, row: PairResult) -> tuple[Array, Array, Array, float]:
     corners = np.vstack([solid.world for solid in solids])
     place = _place(row)
     target = corners.mean(axis=0) if place is None else place
-    _, up, towards_viewer = _best_camera(solids, place).axes()
+    _, up, towards_viewer = Camera().axes()
     return target, towards_viewer, up, float(np.ptp(corners, axis=0).max())
-
-
-def _best_camera(solids: Sequence[PosedMesh], place: Array | None) -> Camera:
-    """The camera that the fewest faces hide the place from."""
-    return _CAMERAS[0] if place is None else min(_CAMERAS, key=lambda camera: _hidden(camera, solids, place))
 
 
 def _at(scene: Scene, row: PairResult) -> Scene:
@@ -144,17 +130,6 @@ def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
     except (Clamp3dError, RuntimeError, ValueError):
         return None
     return None if shared is None else PosedMesh(shared, a.T, VERDICT_COLOURS["clash"])
-
-
-def _hidden(camera: Camera, solids: Sequence[PosedMesh], place: Array) -> int:
-    """How many faces lie between a place and the viewer."""
-    count = 0
-    for solid in solids:
-        R = solid.T[:3, :3]
-        towards = camera.axes()[2]
-        origin = R.T @ (place + 1e-3 * towards - solid.T[:3, 3])
-        count += len(solid.mesh.ray.intersects_location(origin[None], (R.T @ towards)[None])[0])
-    return count
 
 
 def _mark(ax: Axes, camera: Camera, place: Array, row: PairResult, dashes: Any = "solid") -> tuple[float, float]:
