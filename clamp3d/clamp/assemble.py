@@ -11,7 +11,7 @@ from typing import Any, TypedDict, Unpack
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number, text
-from clamp3d.clamp.closing import HELD, open_start
+from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same
@@ -21,10 +21,9 @@ from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.meetings import meetings
-from clamp3d.clamp.places import section_poses
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import B, D, S, Section, W
+from clamp3d.clamp.section import HELD, B, D, S, Section, W
 from clamp3d.clamp.sequence import Step, as_published, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
@@ -34,7 +33,6 @@ from clamp3d.clamp.steps import (
     Meetings,
     approach_line,
     close_splints,
-    first_touch,
     insert_jumper,
     tighten_nut,
 )
@@ -160,7 +158,7 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
     log = Log(section, settings.on_waypoint)
     closing, final = _close(section, settings)
     travel = _play(section, steps, closing, settings, log)
-    poses = section_poses(section, final.q)
+    poses = section.poses(final.q)
     contacts = log.contacts(poses)
     _add_silent_contacts(log, steps, closing, contacts, settings.resolution)
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
@@ -171,7 +169,7 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
         solver=settings.solver,
         closing_status=closing_status(section, final, settings.resolution),
         distance=section.splint_distance(final.q),
-        closing=float(final.q[D]),
+        closing=section.down_splint(final.q).y,
         tilt=float(final.q[S]) / section.lever,
         turns=clamp.bolt.turn(travel) / (2.0 * math.pi),
         poses=poses,
@@ -194,21 +192,19 @@ def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState |
     """Close the clamp: the states on the way, and the last one."""
     start = open_start(section, open_by=settings.open_by, open_tilt=settings.open_tilt)
     met: Meetings = []
-    final: FinalState | SteppedState
     if settings.solver == "exact":
         final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
-        held, met = final.held, [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    else:
-        moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
-        if settings.solver == "stepped":
-            final = solve_stepped(section, **moves)
-        else:
-            final = solve_bisection(section, resolution=RESOLUTION, **moves)
-        held = final.q
-        met = first_touch(section, start, float(start[D] - held[D]))
-    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
-    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-    return Closing(start, held, final.q, by_hand, taken), final
+        met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
+        by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
+        taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
+        return Closing(start, final.held, final.q, by_hand, taken), final
+    moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
+    stepped = (
+        solve_stepped(section, **moves)
+        if settings.solver == "stepped"
+        else solve_bisection(section, resolution=RESOLUTION, **moves)
+    )
+    return Closing(start, stepped.q, stepped.q, [], []), stepped
 
 
 def _play(section: Section, steps: tuple[Step, ...], closing: Closing, settings: _Settings, log: Log) -> float:

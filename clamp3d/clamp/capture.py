@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import descend, open_start
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import SIZE, WIRES, Section
 from clamp3d.clamp.status import closing_status
 from clamp3d.errors import SolverError
@@ -97,7 +97,7 @@ def capture_map(
 
 def close_from(section: Section, start: Array) -> Outcome:
     """What the closing from a state (10,) ends in."""
-    if section.gaps(start).value.min() < 0.0:
+    if section.gaps(start).value.min() < -1e3 * TOLERANCE:
         return Outcome.NO_ROOM
     try:
         status = closing_status(section, solve_final_state(section, start))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +10,7 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
+from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import PAIRS, Pair, plain
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
@@ -21,9 +20,8 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.distance import measure
 from clamp3d.engine.model import ModelCache
 from clamp3d.geometry.pose import Array, SectionPose, inverse
-from clamp3d.geometry.profile import Arc
-from clamp3d.geometry.shapes import Solid
 from clamp3d.kernel.arc_and_circle import classify_arc_circle
+from clamp3d.kernel.contact_model import GroovePair
 from clamp3d.kernel.rectangle import Rectangle, hole_bolt
 
 Poses = Mapping[PartName, SectionPose]
@@ -124,10 +122,10 @@ def measure_contacts(
     solids, contacts = parts(clamp), []
     for (a, b), d in measure(scene, pairs, model=model, cache=cache).items():
         tolerance = TOUCHING if d.estimate is None else _MODEL
-        first = _Side.at(solids[a], poses[a].T(), d.point_a, tolerance)
-        second = _Side.at(solids[b], poses[b].T(), d.point_b, tolerance)
-        kind, relation = _relation(clamp, poses, first, second, d.value)
-        names = [surface.name for surface in (*first.surfaces, *second.surfaces)]
+        places = ((solids[a], poses[a].T(), d.point_a), (solids[b], poses[b].T(), d.point_b))
+        first, second = (() if point is None else surfaces_at(solid, T, point, tolerance) for solid, T, point in places)
+        kind, relation = _relation(clamp, poses, (a, b), d.value, (first, second))
+        names = [surface.name for surface in (*first, *second)]
         feature = "thread" if relation == SCREW_JOINT else min(names, key=SURFACES.index, default="inside")
         contacts.append(Contact(a, b, clamp.connection(a, b), kind, relation, d, feature))
     return tuple(contacts)
@@ -141,96 +139,54 @@ def overlap(contact: Contact) -> str:
     return f"{contact.a} overlaps {contact.b} by {at_least}{-contact.gap:.4g} mm"
 
 
-@dataclass(frozen=True, slots=True)
-class _Side:
-    """One of two parts that are measured: its solid, its pose (4, 4) in the world, and its nearest surfaces."""
-
-    solid: Solid
-    T: Array
-    surfaces: tuple[Surface, ...]
-
-    @classmethod
-    def at(cls, solid: Solid, T: Array, point: Array | None, tolerance: float) -> _Side:
-        """With the surfaces at a point (3,) of the world."""
-        local = None if point is None else inverse(T) @ np.array([*point, 1.0])
-        return cls(solid, T, () if local is None else surfaces_at(solid, local, tolerance))
-
-    def named(self, *names: str) -> Iterator[Surface]:
-        """Its surfaces of these names."""
-        return (surface for surface in self.surfaces if surface.name in names)
-
-
-def _relation(clamp: Clamp, poses: Poses, a: _Side, b: _Side, gap: float) -> tuple[ConnectionType, str]:
+def _relation(
+    clamp: Clamp, poses: Poses, pair: Pair, gap: float, surfaces: tuple[tuple[Surface, ...], tuple[Surface, ...]]
+) -> tuple[ConnectionType, str]:
     """Type of the connection by what touches, and what the paper calls it, or the plainest word where it has none."""
-    if _threaded(a, b) or _threaded(b, a):
+    if pair == ("P4", "P5") and gap <= TOUCHING and _is_screwed_on(clamp, poses):
         return 1, SCREW_JOINT
-    for arc, back in ((a, b), (b, a)):
-        for concave, convex in itertools.product(arc.named("arc", "lip"), back.named("round face")):
-            if gap <= TOUCHING or clamp.connection(a.solid.name, b.solid.name) == 3:
-                return (3 if gap <= TOUCHING else 0), _arc_relation(arc, concave, back, convex, gap)
+    first, second = ({surface.name for surface in own} for own in surfaces)
+    groove = next((groove for groove in groove_pairs(clamp).values() if {groove.a, groove.b} == set(pair)), None)
+    if groove is not None and (gap <= TOUCHING or clamp.connection(*pair) == 3):
+        hollow, back = (first, second) if groove.a == pair[0] else (second, first)
+        if hollow & {"arc", "lip"} and "round face" in back:
+            return (3 if gap <= TOUCHING else 0), _arc_relation(groove, poses, gap)
     if gap > TOUCHING:
         return 0, NONE
     if gap < -TOUCHING:
         return 2, "overlap"
-    if any(_face_each_other(a, x, b, y) for x, y in itertools.product(a.surfaces, b.surfaces)):
+    flat = [(x.normal, y.normal) for x in surfaces[0] for y in surfaces[1]]
+    if any(x is not None and y is not None and np.linalg.norm(x + y) <= _PARALLEL for x, y in flat):
         return 2, "seat"
-    if a.solid.name in SPLINTS and any(a.named("hole")) and any(b.named("round face")):
-        words = _hole_relation(clamp, poses, a.solid.name)
+    if pair[0] in SPLINTS and "hole" in first and "round face" in second:
+        words = _hole_relation(clamp, poses, pair[0])
         return 2, "contact" if words == NONE else words
     return 2, "contact"
 
 
-def _arc_relation(arc: _Side, concave: Surface, back: _Side, convex: Surface, gap: float) -> str:
+def _arc_relation(pair: GroovePair, poses: Poses, gap: float) -> str:
     """Column of Table 3 for a concave arc and a round face along it."""
-    groove, circle = concave.edge, convex.edge
-    if not (isinstance(groove, Arc) and isinstance(circle, Arc)):
-        return NONE
-    centre = convex.extrusion.frame @ np.array([*circle.centre, 0.0])
-    T = inverse(arc.T) @ back.T
-    a, b, _ = (T[:3, :3] @ centre + T[:3, 3]) @ concave.extrusion.frame
-    x, y = float(a) - groove.centre[0], float(b) - groove.centre[1]
-    deepest = 0.5 * (groove.start_angle + groove.end_angle)
-    c, s = -math.sin(deepest), math.cos(deepest)  # turned until the deepest point is at -y
-    half = 0.5 * abs(groove.sweep)
-    x, y = c * x + s * y, c * y - s * x
-    return classify_arc_circle(gap, groove.radius, half, circle.radius, x, y, tolerance=TOUCHING).value
+    T = pair.T_groove_a @ inverse(poses[pair.a].T()) @ poses[pair.b].T() @ pair.T_b_cylinder
+    groove, (x, y) = pair.groove, T[:2, 3].tolist()
+    radius = pair.cylinder.radius
+    return classify_arc_circle(gap, groove.radius, groove.half_angle, radius, x, y, tolerance=TOUCHING).value
 
 
-def _face_each_other(a: _Side, x: Surface, b: _Side, y: Surface) -> bool:
-    """Whether two surfaces are flat and their normals opposite, to what a part's size makes of `TOUCHING`."""
-    if x.normal is None or y.normal is None:
-        return False
-    return bool(np.linalg.norm(a.T[:3, :3] @ x.normal + b.T[:3, :3] @ y.normal) <= _PARALLEL)
-
-
-def _threaded(bolt: _Side, nut: _Side) -> bool:
-    """Whether a round bar of one part stands in a round hole of the other that it fills: threads are not drawn."""
-    T = inverse(nut.T) @ bolt.T
-    for bar, hole in itertools.product(bolt.solid.bodies, nut.solid.holes):
-        circle, bore = bar.profile.edges[0], hole.profile.edges[0]
-        if not (isinstance(circle, Arc) and isinstance(bore, Arc)) or bar.axis != hole.axis:
-            continue
-        frame = hole.frame
-        ends = [frame.T @ (T[:3, :3] @ frame @ np.array([*circle.centre, z]) + T[:3, 3]) for z in (bar.start, bar.end)]
-        filled = abs(circle.radius - bore.radius) <= TOUCHING
-        coaxial = all(math.dist(end[:2], bore.centre) <= TOUCHING for end in ends)
-        low, high = sorted(float(end[2]) for end in ends)
-        if filled and coaxial and low < hole.end and high > hole.start:
-            return True
-    return False
+def _is_screwed_on(clamp: Clamp, poses: Poses) -> bool:
+    """Whether the shank stands in the nut's hole, which it fills: threads are not drawn."""
+    bolt, nut = poses["P4"], poses["P5"]
+    is_coaxial = max(abs(bolt.x - nut.x), abs(bolt.along - nut.along)) <= TOUCHING
+    return is_coaxial and bolt.y < nut.y + clamp.nut.height and bolt.y + clamp.bolt.shank_length > nut.y
 
 
 def _hole_relation(clamp: Clamp, poses: Poses, splint: PartName) -> str:
     """Row of Table 2 for the bolt in the hole of a splint."""
     shank = clamp.bolt.shank_length / 2
     bolt = Rectangle(*poses["P4"].point(0.0, shank), clamp.bolt.diameter / 2, shank)
-    if splint == "P1":
-        up = clamp.up_splint
-        middle, half_width, top, bottom = up.width / 2, up.hole_diameter / 2, 0.0, up.thickness
-    else:  # the slot's walls end where they come out of the round back
-        down = clamp.down_splint
-        middle, half_width, top = 0.0, down.slot_width / 2, down.face_depth
-        bottom = math.sqrt(down.back_radius**2 - half_width**2)
+    up, down = clamp.up_splint, clamp.down_splint
+    middle, width, top, bottom = up.width / 2, up.hole_diameter, 0.0, up.thickness
+    if splint == "P2":
+        middle, width, top, bottom = 0.0, down.slot_width, down.face_depth, down.slot_bottom
     centre = poses[splint].point(middle, 0.5 * (top + bottom))
-    hole = Rectangle(*centre, half_width, 0.5 * (bottom - top), poses[splint].angle)
+    hole = Rectangle(*centre, width / 2, 0.5 * (bottom - top), poses[splint].angle)
     return hole_bolt(hole, bolt, tolerance=TOUCHING).relation.value

@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias, cast
 
+import numpy as np
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from clamp3d.clamp.conductors import conductor
 from clamp3d.errors import InputError
@@ -272,6 +274,13 @@ class Clamp:
             far = math.hypot(half, depth)
             stops["the slot"] = min(stops.get("the slot", math.inf), math.acos(r / far) - math.atan2(depth, half))
         return stops
+
+    def lifted(self, tilt: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How high (n,) over the saddle's apex the saddle's edges hold the centred down splint at a tilt (n,); mm."""
+        distance, angle = self._saddle_edge
+        half, under = self.saddle.width / 2, self.down_splint.underside_depth
+        raised = (under + half * np.abs(np.sin(tilt))) / np.cos(tilt) - distance * math.cos(angle)
+        return np.maximum(0.0, raised)
 
     @property
     def tilt_stop(self) -> float:

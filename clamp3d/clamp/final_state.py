@@ -12,34 +12,34 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from clamp3d.clamp.closing import CLOSING, HELD, STILL, STRIDE, OnContact, descend, open_start
-from clamp3d.clamp.curvature import LEVEL, lagrangian_hessian, least_curvature, rounding_of_normals, touched
+from clamp3d.clamp.closing import CLOSING, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
+from clamp3d.clamp.section import HELD, SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-9
 """Largest violated gap and largest optimality residual of a proven answer, in mm."""
+LEVEL = 1e-6
+"""Curvature in 1/mm that counts as none."""
 
 _ACTIVE = 1e-6
-_ACTIVE_TRIES = ((1e-6, 0.0), (1e-8, 0.0), (1e-10, 0.0), (1e-4, 0.0), (1e-6, 0.1))
-"""Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks. And the
-least multiplier that counts on the way: of arc and lip, 1e-8 mm apart, both seem to carry while the arc's normal is
-off."""
+_ACTIVE_TRIES = (1e-6, 1e-8, 1e-10, 1e-4)
+"""Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
 _ATTEMPTS = 4
 _PERTURBATION = 1.5e-3
 """How far a restart begins from the last end, in parts of the down splint's half width."""
-_SETTLING = 300
-"""Steps in which a loose wire falls; it stays where it was if that is not enough."""
 _ONE_CONTACT = 3e-5
 """Gaps of two parts whose derivatives differ by less are one contact: face and lip where the one goes over into the
 other. A wire of 1 mm that is `TOLERANCE` off the face has turned by so much about the lip."""
 _NO_MULTIPLIER = 1e-9
 """Multipliers below are rounding of the least squares: a wire they hold is not held."""
+_TURNED = 1e-5
+"""Largest residual that may come from rounded normals: the distance is off by its square times some 10 mm, 1e-9 mm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,8 @@ class FinalState:
     violation : float
         Deepest overlap, mm.
     optimality : float
-        Largest of the last Newton step, the stationarity residual over 1 mm (less what rounding turns normals by, see
-        `rounding_of_normals`) and the complementarity ``sum(multiplier * |gap|)``; mm.
+        Largest of the last Newton step, the stationarity residual over 1 mm (less what rounding turns normals by) and
+        the complementarity ``sum(multiplier * |gap|)``; mm.
     loose : tuple of str
         Wires that no contact force holds.
     curvature : float
@@ -83,8 +83,17 @@ class FinalState:
     @property
     def active(self) -> tuple[tuple[Pair, str], ...]:
         """Pair and feature of each strongly active gap: what holds the state."""
-        rows = zip(self.gaps.pair, self.gaps.feature, self.multipliers, strict=True)
-        return tuple((pair, feature) for pair, feature, multiplier in rows if multiplier > 0.0)
+        return tuple((self.gaps.pair[k], self.gaps.feature[k]) for k in np.flatnonzero(self.multipliers))
+
+    @property
+    def residual(self) -> float:
+        """Largest residual of the optimality conditions, mm; infinite if it is not a number."""
+        return float(np.nan_to_num(max(self.violation, self.optimality), nan=np.inf))
+
+    @property
+    def is_proven(self) -> bool:
+        """Feasible, stationary, and no saddle."""
+        return self.residual <= TOLERANCE and self.curvature >= -LEVEL
 
 
 def solve_final_state(
@@ -118,112 +127,98 @@ def solve_final_state(
     held = end = descend(section, start, free=HELD, stride=stride, on_contact=on_contact)
     if section.free != HELD:
         end = descend(section, held, stride=stride, on_contact=on_contact)
-    found = _best(section, end, start, held)
+    final = _best(section, end, start, held)
     for attempt in range(_ATTEMPTS):
-        if _proven(found):
-            break
+        if final.is_proven:
+            return final
         # Degenerate active set or saddle point: let it slide off, or restart from a perturbed, slightly opened state.
-        q = end if attempt == 0 else _perturb(section, found.q, attempt)
+        q = end if attempt == 0 else _perturb(section, final.q, attempt)
         again = _best(section, descend(section, q, stride=stride, at_rest=STILL), start, held)
-        if _proven(again) or _kkt_residual(again) < _kkt_residual(found):
-            found = again
-    if _proven(found):
-        return found
+        if again.is_proven or again.residual < final.residual:
+            final = again
+    if final.is_proven:
+        return final
     raise SolverError(
-        f"final state not proven: largest violated gap {found.violation:.3g} mm, optimality {found.optimality:.3g} mm, "
-        f"both must be <= {TOLERANCE:g} mm; curvature {found.curvature:.3g} 1/mm, must be >= 0"
+        f"final state not proven: largest violated gap {final.violation:.3g} mm, optimality {final.optimality:.3g} mm, "
+        f"both must be <= {TOLERANCE:g} mm; curvature {final.curvature:.3g} 1/mm, must be >= 0"
     )
+
+
+def open_up(section: Section, q: Array, step: float) -> Array | None:
+    """The state ``q`` opened in moves of ``step`` mm until nothing overlaps; None if that is not near."""
+    q = q.copy()
+    for _ in range(200):
+        gaps = section.gaps(q)
+        k = int(np.argmin(gaps.value))
+        if gaps.value[k] >= -TOLERANCE:
+            return q
+        q[D] += step
+        if gaps.pair[k][0] == "P1":  # opening does not help the wire out of the up splint
+            q[:4] -= gaps.value[k] * gaps.gradient[k, :4]
+        elif gaps.pair[k] == ("P2", "P3"):  # nor the down splint out of the saddle
+            q[U] -= gaps.value[k]
+    return None
 
 
 def _best(section: Section, q: Array, start: Array, held: Array) -> FinalState:
     """The state at the end of a path, with the active set that proves it best."""
-    best = _certify(section, q, start, held, *_ACTIVE_TRIES[0])
-    for tried in _ACTIVE_TRIES[1:]:
-        if _kkt_residual(best) <= TOLERANCE:
+    best = None
+    for active in _ACTIVE_TRIES:
+        state = _certify(section, q, start, held, active)
+        best = state if best is None else min(best, state, key=lambda one: one.residual)
+        if best.residual <= TOLERANCE:
             break
-        best = min(best, _certify(section, q, start, held, *tried), key=_kkt_residual)
+    assert best is not None
     return best
 
 
-def _proven(state: FinalState) -> bool:
-    """Feasible, stationary, and no saddle."""
-    return _kkt_residual(state) <= TOLERANCE and state.curvature >= -LEVEL
-
-
-def _kkt_residual(state: FinalState) -> float:
-    """Largest residual of the optimality conditions, mm; infinite if it is not a number."""
-    residual = max(state.violation, state.optimality)
-    return residual if residual == residual else np.inf
-
-
-def _certify(section: Section, q: Array, start: Array, held: Array, active: float, least: float) -> FinalState:
+def _certify(section: Section, q: Array, start: Array, held: Array, active: float) -> FinalState:
     """Polish a state whose active set are the gaps within ``active`` mm, settle loose wires, and measure the proof."""
-    q, optimality = _polish(section, q, active, least)
+    q, step = _polish(section, q, active)
     gaps = section.gaps(q)
     multipliers = _multipliers(section, gaps, active)
-    loose = _not_held(gaps, multipliers)
+    bearing = {part for k in np.flatnonzero(multipliers) for part in gaps.pair[k]}
+    loose = tuple(wire for wire in WIRES if wire not in bearing)
     for wire in loose:
         q = _settle_loose(section, q, wire)
     if loose:
         gaps = section.gaps(q)
     unbalanced = (CLOSING - multipliers @ gaps.gradient)[list(section.free)]
-    residual = max(0.0, float(np.abs(unbalanced).max()) - rounding_of_normals(section, q))
-    violation = max(0.0, -float(gaps.value.min()))
+    # A wire that fills its groove turns its normal with the rounding of its place.
+    turned = min(_TURNED, 4.0 * float(np.spacing(np.abs(q).max())) / max(section.least_slack, 1e-300))
+    residual = float(np.abs(unbalanced).max()) - turned
     complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
-    curvature = least_curvature(section, q, gaps, multipliers, TOLERANCE)
-    optimality = max(optimality, residual, complementarity)
-    if section.free == HELD:  # nothing moves while the nut turns
-        held = q
-    return FinalState(q, start, held, gaps, multipliers, violation, optimality, loose, curvature)
+    return FinalState(
+        q=q,
+        start=start,
+        held=q if section.free == HELD else held,  # nothing moves while the nut turns
+        gaps=gaps,
+        multipliers=multipliers,
+        violation=max(0.0, -float(gaps.value.min())),
+        optimality=max(step, residual, complementarity),
+        loose=loose,
+        curvature=_least_curvature(section, q, gaps, multipliers),
+    )
 
 
 def _perturb(section: Section, q: Array, attempt: int) -> Array:
     """An open state near q, another one for each attempt."""
-    rng = np.random.default_rng(attempt)
-    new = q.copy()
-    step = _PERTURBATION * section.lever
-    new[:4] += rng.uniform(-step, step, 4)
-    new[S] += rng.uniform(-step, step)
-    for _ in range(200):
-        gaps = section.gaps(new)
-        k = int(np.argmin(gaps.value))
-        if gaps.value[k] >= 0.0:
-            break
-        new[D] += step
-        if gaps.pair[k][0] == "P1":  # opening does not help the wire out of the up splint
-            new[:4] -= gaps.value[k] * gaps.gradient[k, :4]
-        elif gaps.pair[k] == ("P2", "P3"):  # nor the down splint out of the saddle
-            new[U] -= gaps.value[k]
-    return new
-
-
-def _not_held(gaps: Gaps, multipliers: Array) -> tuple[PartName, ...]:
-    """The wires that no contact force holds."""
-    held = {wire for pair, force in zip(gaps.pair, multipliers, strict=True) if force > 0.0 for wire in pair}
-    return tuple(wire for wire in WIRES if wire not in held)
+    rng, step, new = np.random.default_rng(attempt), _PERTURBATION * section.lever, q.copy()
+    new[[0, 1, 2, 3, S]] += rng.uniform(-step, step, 5)
+    opened = open_up(section, new, step)
+    return q if opened is None else opened
 
 
 def _settle_loose(section: Section, q: Array, wire: PartName) -> Array:
     """Where gravity leaves a loose wire: the clamp hangs on the line, the jumper lies in the down splint."""
     if wire in section.escaped(q):
         return q
-    x, y = 2 * WIRES.index(wire), 2 * WIRES.index(wire) + 1
-    goal = np.zeros(SIZE)
-    goal[y] = 1.0 if wire == "P6" else -1.0
+    y = 2 * WIRES.index(wire) + 1
     try:
-        fallen = descend(section, q, goal, free=(x, y), most=_SETTLING)
+        fallen = descend(section, q, np.eye(SIZE)[y] * (1.0 if wire == "P6" else -1.0), free=(y - 1, y))
     except SolverError:
         return q
-    depth = np.inf
-    for _ in range(50):  # out of the overlap that the descent tolerates, not into what else is as near
-        gaps = section.wire_gaps(fallen, wire)
-        depth = -float(gaps.value.min())
-        if depth <= 0.0:
-            return fallen
-        near = gaps.value < depth
-        fallen = fallen.copy()
-        fallen[[x, y]] -= np.linalg.lstsq(gaps.gradient[near][:, [x, y]], gaps.value[near])[0]
-    return fallen if depth <= TOLERANCE else q
+    return fallen if section.wire_gaps(fallen, wire).value.min() >= -TOLERANCE else q
 
 
 def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
@@ -236,10 +231,9 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
     in_set, free = np.abs(gaps.value) <= active, list(section.free)
     flat = [name.replace("lip", "flat") for name in gaps.feature]
     for i, j in itertools.combinations(np.flatnonzero(in_set), 2):
-        if gaps.pair[i] != gaps.pair[j]:
-            continue
         beside = flat[i] == flat[j] and flat[i].startswith("flat")
-        if beside or np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT:
+        alike = beside or np.abs(gaps.gradient[i] - gaps.gradient[j]).max() <= _ONE_CONTACT
+        if gaps.pair[i] == gaps.pair[j] and alike:
             in_set[i if gaps.value[i] >= gaps.value[j] else j] = False
     multipliers = np.zeros(len(gaps.value))
     if in_set.any():
@@ -248,24 +242,27 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
     return multipliers
 
 
-def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Array, float]:
+def _touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The free coordinates that any of the gaps ``rows`` depends on."""
+    free = np.array(section.free)
+    return np.asarray(free[np.abs(gaps.gradient[np.ix_(rows, free)]).max(axis=0, initial=0.0) > 0.0])
+
+
+def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
     """Newton's method on stationarity and the active gaps together; returns the state and its last step in mm.
 
-    A gap that a step has closed too far joins the active set; multipliers below ``least`` do not count.
+    A gap that a step has closed too far joins the active set.
     """
     step = np.inf
     for _ in range(20):
         gaps = section.gaps(q)
         multipliers = _multipliers(section, gaps, active)
-        multipliers[multipliers < least] = 0.0
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
-        free = touched(section, gaps, rows)
-        if step > _ACTIVE:  # nearer it does not change any more
-            hessian = lagrangian_hessian(section, q, gaps, multipliers)
-        A = gaps.gradient[rows]
-        k, n = len(rows), len(free)
-        kkt = np.block([[hessian[np.ix_(free, free)], -A[:, free].T], [A[:, free], np.zeros((k, k))]])
+        free = _touched(section, gaps, rows)
+        A, k, n = gaps.gradient[rows], len(rows), len(free)
+        hessian = -section.hessian(q, gaps, multipliers)[np.ix_(free, free)]
+        kkt = np.block([[hessian, -A[:, free].T], [A[:, free], np.zeros((k, k))]])
         rhs = -np.concatenate([(CLOSING - multipliers[rows] @ A)[free], gaps.value[rows]])
         move = np.zeros(SIZE)
         move[free] = np.linalg.lstsq(kkt, rhs, 1e-12)[0][:n]
@@ -274,3 +271,34 @@ def _polish(section: Section, q: Array, active: float, least: float) -> tuple[Ar
             break
         q, step = q + move, new
     return q, step
+
+
+def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array) -> float:
+    """Least second derivative of the Lagrangian by unit motions of the critical cone.
+
+    The critical cone keeps the strongly active gaps (multiplier > 0) closed and lets no weakly active one (closed to
+    `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here (a plane is looked at degree by degree);
+    more are looked at by random directions.
+    """
+    strong = np.flatnonzero(multipliers)
+    free = _touched(section, gaps, strong)
+    if not len(free):
+        return np.inf
+    _, sizes, rows = np.linalg.svd(gaps.gradient[np.ix_(strong, free)])
+    tangent = rows[int((sizes > 1e-9).sum()) :]
+    if not len(tangent):
+        return np.inf
+    reduced = tangent @ -section.hessian(q, gaps, multipliers)[np.ix_(free, free)] @ tangent.T
+    least = float(np.linalg.eigvalsh(reduced)[0])
+    weak = np.flatnonzero((np.abs(gaps.value) <= TOLERANCE) & (multipliers == 0.0))
+    if least >= -LEVEL or not len(weak):
+        return least
+    if len(tangent) <= 2:
+        angle = np.linspace(0.0, 2.0 * np.pi, 721)
+        motions = np.column_stack([np.cos(angle), np.sin(angle)])[:, : len(tangent)]
+    else:
+        motions = np.random.default_rng(0).normal(size=(20_000, len(tangent)))
+    motions /= np.maximum(np.linalg.norm(motions, axis=1), 1e-9)[:, None]
+    opens = gaps.gradient[np.ix_(weak, free)] @ tangent.T @ motions.T
+    motions = motions[(opens >= -1e-7).all(axis=0)]
+    return float(np.einsum("ni,ij,nj->n", motions, reduced, motions).min(initial=np.inf))

@@ -9,7 +9,6 @@ import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, PartName
 from clamp3d.clamp.matrix import PAIRS, Pair
-from clamp3d.clamp.places import saddle_rise, section_poses
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import D, Section
 from clamp3d.clamp.sequence import Step
@@ -42,8 +41,8 @@ def follow(section: Section, steps: Sequence[Step], closing: Closing, log: Log) 
         drawn = closing
         if "P2" in step.parts:  # the saddle goes with it
             for pair, q in [*closing.by_hand, *closing.taken]:
-                log.reach(step.name, f"down splint touches {pair[1]}", section_poses(section, q))
-                log.touch(q, step.name, pair, saddle_rise(section, q, float(closing.start[D])))
+                log.reach(step.name, f"down splint touches {pair[1]}", section.poses(q))
+                log.touch(q, step.name, pair, float(closing.start[D] - q[D]))
             drawn = replace(closing, held=closing.end, taken=[])
         travel = tighten_nut(section, drawn, step.name, log)
     return travel
@@ -76,14 +75,14 @@ class _Plan:
 
     def __init__(self, section: Section, steps: Sequence[Step], closing: Closing, log: Log) -> None:
         self.steps, self._ways = steps, Ways(section.clamp, log.cache)
-        start = section_poses(section, closing.start)
-        held = section_poses(section, closing.held, saddle_d=float(closing.start[D]))
+        start = section.poses(closing.start)
+        held = section.poses(closing.held, saddle_d=float(closing.start[D]))
         self.bases = [start]
         for step in steps:
-            kinds = {"bring": self.bases[-1], "close": held, "tighten": section_poses(section, closing.end)}
+            kinds = {"bring": self.bases[-1], "close": held, "tighten": section.poses(closing.end)}
             self.bases.append(kinds[step.kind])
         self.legs: list[tuple[Leg, ...]] = [()] * len(steps)
-        rise = saddle_rise(section, closing.end, float(closing.start[D]))
+        rise = float(closing.start[D] - closing.end[D])
         for k in range(len(steps)):
             self._search(k, rise)
         self._spread()

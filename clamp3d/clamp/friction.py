@@ -31,12 +31,12 @@ from numpy.typing import NDArray
 from scipy.optimize import bisect, linprog, nnls
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.clamp.closing import CLOSING, HELD
+from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.dimensions import Clamp, Joints, PartName
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
-from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, S, Section, U
+from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, S, Section
 from clamp3d.clamp.status import closing_status
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
@@ -132,15 +132,18 @@ class _Wire:
     """A wire and its two arcs: centre of P1's arc from P1's corner (``up``), of P2's from P2's origin (``down``), half
     angles of both, and what each arc's radius is larger than the wire's; mm and rad, x right and y down."""
 
-    up: tuple[float, float]
-    down: tuple[float, float]
+    up: Array
+    down: Array
     half_angles: tuple[float, float]
     slack: tuple[float, float]
 
-    def separation(self, friction: float) -> float:
-        """Distance of the two arc centres at which the wire's forces are on the edges of the friction cones; mm."""
-        p, q = self.slack
-        return math.sqrt(p * p + q * q + 2.0 * p * q * math.cos(2.0 * math.atan(friction)))
+    @classmethod
+    def of(cls, section: Section, wire: PartName) -> _Wire:
+        """A wire of a clamp."""
+        pairs = [section.pairs[splint, wire] for splint in SPLINTS]
+        up, down = (p.T_a_groove[[0, 2], 3] * (1.0, -1.0) for p in pairs)
+        halves, slacks = zip(*((p.groove.half_angle, p.groove.radius - p.cylinder.radius) for p in pairs), strict=True)
+        return cls(up, down, halves, slacks)
 
     def offset(self, bolt_x: float, tilt: Array) -> tuple[Array, Array]:
         """From P1's arc centre to P2's, mm, with P2's origin at P1's height."""
@@ -148,29 +151,27 @@ class _Wire:
         return bolt_x + u * c + v * s - self.up[0], v * c - u * s - self.up[1]
 
     def distance(self, bolt_x: float, tilt: Array, friction: float) -> Array:
-        """How far P2's origin is below P1's, mm, at the separation of a friction; NaN where it cannot be."""
-        x, y = self.offset(bolt_x, tilt)
+        """How far P2's origin is below P1's, mm, where the wire's forces are on the edges of the friction cones; NaN
+        where it cannot be."""
+        (p, q), (x, y) = self.slack, self.offset(bolt_x, tilt)
+        separation = p * p + q * q + 2.0 * p * q * math.cos(2.0 * math.atan(friction))  # squared
         with np.errstate(invalid="ignore"):
-            return np.asarray(-y - np.sqrt(self.separation(friction) ** 2 - x * x))
+            return np.asarray(-y - np.sqrt(separation - x * x))
 
-    def places(self, bolt_x: float, d: Array, tilt: Array) -> tuple[tuple[Array, Array, NDArray[np.bool_]], ...]:
+    def places(self, bolt_x: float, d: Array, tilt: Array) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
         """Both places of the wire's centre with both contacts closed, mm, and whether both are on the arcs."""
         (p, q), (x, y) = self.slack, self.offset(bolt_x, tilt)
         y = y + d
-        apart = np.maximum(np.hypot(x, y), 1e-300)
+        apart, c, s = np.maximum(np.hypot(x, y), 1e-300), np.cos(tilt), np.sin(tilt)
         along = (p * p - q * q + apart * apart) / (2.0 * apart)
-        aside = np.sqrt(np.maximum(p * p - along * along, 0.0))
-        return tuple(self._place(tilt, (x, y), along / apart, side * aside / apart) for side in (-1.0, 1.0))
-
-    def _place(
-        self, tilt: Array, between: tuple[Array, Array], along: Array, aside: Array
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        x, y = between
-        right, below = along * x - aside * y, along * y + aside * x
-        in_up = np.abs(np.arctan2(right, -below)) <= self.half_angles[0]
-        dx, dy, c, s = right - x, below - y, np.cos(tilt), np.sin(tilt)
-        in_down = np.abs(np.arctan2(dx * c - dy * s, dx * s + dy * c)) <= self.half_angles[1]
-        return self.up[0] + right, self.up[1] + below, in_up & in_down
+        places = []
+        for aside in np.sqrt(np.maximum(p * p - along * along, 0.0)) * np.array([-1.0, 1.0]).reshape(2, *[1] * d.ndim):
+            right, below = (along * x - aside * y) / apart, (along * y + aside * x) / apart
+            dx, dy = right - x, below - y
+            on_arcs = np.abs(np.arctan2(right, -below)) <= self.half_angles[0]
+            on_arcs &= np.abs(np.arctan2(dx * c - dy * s, dx * s + dy * c)) <= self.half_angles[1]
+            places.append((self.up[0] + right, self.up[1] + below, on_arcs))
+        return places
 
 
 class FrictionBand:
@@ -200,14 +201,7 @@ class FrictionBand:
 
     @cached_property
     def _wires(self) -> tuple[_Wire, ...]:
-        return tuple(self._wire(wire) for wire in WIRES)
-
-    def _wire(self, wire: PartName) -> _Wire:
-        up, down = self.section.pairs["P1", wire], self.section.pairs["P2", wire]
-        (xu, yu), (xd, yd) = ((float(p.T_a_groove[0, 3]), -float(p.T_a_groove[2, 3])) for p in (up, down))
-        radius = up.cylinder.radius
-        slack = up.groove.radius - radius, down.groove.radius - radius
-        return _Wire((xu, yu), (xd, yd), (up.groove.half_angle, down.groove.half_angle), slack)
+        return tuple(_Wire.of(self.section, wire) for wire in WIRES)
 
     def ends(self, friction: float) -> tuple[float, float]:
         """The least and the greatest splint distance at which equilibrium exists, mm, without certificates."""
@@ -225,10 +219,8 @@ class FrictionBand:
         below = distance < self.distance
 
         def lacking(friction: float) -> float:
-            if friction == 0.0:
-                return -abs(distance - self.distance)
-            least, greatest = self.ends(friction)
-            return distance - least if below else greatest - distance
+            end = self._extreme(friction, 1.0 if below else -1.0)[0] if friction else self.distance
+            return distance - end if below else end - distance
 
         if distance == self.distance:
             return 0.0
@@ -317,26 +309,22 @@ class FrictionBand:
 class Balance:
     """Which forces can act at a state of the section (joints without play), with friction between wires and splints.
 
-    ``A`` (m, 9) is the work of unit forces along the edges of the friction cones, for unit motions of the seven
-    coordinates that move and of the turns of both wires; ``gap`` (m,) is the gap that each belongs to.
+    ``A`` (m, 9) is the work of ``push`` (m, 2), unit forces along the edges of the friction cones, for unit motions of
+    the seven coordinates that move and of the turns of both wires; ``gap`` (m,) is the gap that each belongs to.
     """
 
     def __init__(self, section: Section, q: Array, friction: float) -> None:
-        self.section, self.q, self.gaps = section, q, section.gaps(q)
-        rows, self.gap, self.push = [], [], []
-        for k in np.flatnonzero(np.abs(self.gaps.value) <= CLOSED):
-            normal = self.gaps.normal[k]
-            tangent = np.array([-normal[1], normal[0]]) * friction
-            on_wire = self.gaps.pair[k][1] in WIRES and self.gaps.pair[k][0] != "P4"
-            for push in (normal + tangent, normal - tangent) if on_wire else (normal,):
-                rows.append(unit_work(section, q, self.gaps, int(k), push) if on_wire else self._frictionless(int(k)))
-                self.gap.append(int(k))
-                self.push.append(push)
-        self.A = np.array(rows).reshape(-1, len(HELD) + len(WIRES))
+        self.q, self.gaps = q, section.gaps(q)
+        edges = []
+        for k in np.flatnonzero(np.abs(self.gaps.value) <= CLOSED).tolist():
+            a, b = self.gaps.pair[k]
+            x, y = self.gaps.normal[k]
+            sides = (friction, -friction) if b in WIRES and a != "P4" else (0.0,)
+            edges += [(k, (x - side * y, y + side * x)) for side in sides]
+        self.gap, self.push = [k for k, _ in edges], np.array([push for _, push in edges]).reshape(-1, 2)
+        work = section.work(q, [self.gaps.pair[k] for k in self.gap], self.gaps.point[self.gap], self.push)
+        self.A = work[:, [*HELD, SIZE, SIZE + 1]]
         self.load = np.append(CLOSING[list(HELD)], np.zeros(len(WIRES)))
-
-    def _frictionless(self, k: int) -> Array:
-        return np.append(self.gaps.gradient[k][list(HELD)], np.zeros(len(WIRES)))
 
     def forces(self) -> tuple[Array, float]:
         """Forces >= 0 (m,) along the cones' edges that balance the bolt's unit force best, and what they leave."""
@@ -348,35 +336,19 @@ class Balance:
 
         If any forces f >= 0 balanced the load, ``load = A.T f``, the drive ``load . y = f . A y`` would be <= 0.
         """
-        found = linprog(-self.load, self.A, np.zeros(len(self.A)), bounds=(-1.0, 1.0), method="highs")
-        if found.x is None:
-            raise SolverError(f"friction band: no certificate at a state: {found.message}")
-        motion = np.asarray(found.x)
+        motion = linprog(-self.load, self.A, np.zeros(len(self.A)), bounds=(-1.0, 1.0), method="highs").x
+        if motion is None:
+            raise SolverError("friction band: the linear program of a state was not solved")
         return NoEquilibrium(motion, float(self.load @ motion), max(0.0, float((self.A @ motion).max(initial=0.0))))
 
     def world_forces(self, forces: Array) -> tuple[Force, ...]:
         """The contact forces in the world, those of both edges of a cone together."""
-        result = []
-        for k in sorted(set(self.gap)):
-            edges = [f * push for f, push, gap in zip(forces, self.push, self.gap, strict=True) if gap == k]
-            total = np.sum(edges, axis=0)
-            if np.hypot(*total) > BALANCED:
-                result.append(world_force(self.q, *self.gaps.pair[k], self.gaps.feature[k], total, self.gaps.point[k]))
-        return tuple(result)
-
-
-def unit_work(section: Section, q: Array, gaps: Gaps, k: int, push: Array) -> Array:
-    """Work (9,) of ``push`` (2,) on the wire of gap k, and of its reaction on the splint, for unit motions."""
-    (splint, wire), work = gaps.pair[k], np.zeros(SIZE)
-    i, (x, y) = WIRES.index(wire), gaps.point[k]
-    work[2 * i : 2 * i + 2] = push
-    if splint == "P2":
-        origin = section.down_splint(q)
-        work[D], work[U] = -push[1], push[1]
-        work[S] = -(push[0] * (y - origin.y) - push[1] * (x - origin.x)) / section.lever
-    turns, radius = np.zeros(len(WIRES)), section.pairs["P1", wire].cylinder.radius
-    turns[i] = (push[0] * (y - q[2 * i + 1]) - push[1] * (x - q[2 * i])) / radius
-    return np.append(work[list(HELD)], turns)
+        total = np.zeros_like(self.gaps.normal)
+        np.add.at(total, self.gap, forces[:, None] * self.push)
+        return tuple(
+            world_force(self.q, *self.gaps.pair[k], self.gaps.feature[k], total[k], self.gaps.point[k])
+            for k in np.flatnonzero(np.hypot(*total.T) > BALANCED)
+        )
 
 
 def _friction(friction: float) -> float:

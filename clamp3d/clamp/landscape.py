@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clamp3d.clamp.final_state import open_up
 from clamp3d.clamp.section import SIZE, WIRES, D, S, Section, U
 from clamp3d.geometry.pose import Array
 from clamp3d.kernel.contact_model import GroovePair
@@ -22,83 +23,87 @@ _TILTS, _POSITIONS = 481, 961
 _ADVANCES = 80
 _LEVEL = 1e-9
 """Distances that differ by this part of the wire's radius are level: between two faces a wire rests anywhere."""
-_ROUNDING = 1e-9
-"""Overlap in parts of the wire's radius that is none: a wire stands beside the bolt."""
 _CLEAR = 1e-3
-"""Gap in parts of the wire's radius that a start leaves to what it would touch."""
+"""Moves in parts of the wire's radius by which a start is opened."""
 
 
 def initial_guesses(section: Section) -> list[Array]:
     """Open states q (10,), each just above a local minimum of the feasible distance; the lowest first."""
     limit, lever = section.clamp.tilt_stops["the slot"], section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
-    lifted = section.lifted(tilts)
-    faces = np.array([-section.face_gap(_tilted(section, tilt)) for tilt in tilts])  # least d without an overlap
-    wires = [_Minima(section, i, tilts) for i in range(len(WIRES))]
-    found: list[Array] = []
+    lifted = section.clamp.lifted(tilts)
+    faces = [-section.face_gap(lever * tilt * np.eye(SIZE)[S]) for tilt in tilts]  # least d without an overlap
+    line, jumper = (_Landscape.of(section, i, tilts) for i in range(len(WIRES)))
 
-    def least(k: int, a: int, b: int) -> float:
-        return float(max(faces[k], wires[0].least[a], wires[1].least[b]) + lifted[k])
+    def height(k: int, a: int, b: int) -> float:
+        return float(max(faces[k], line.least[k][a], jumper.least[k][b]) + lifted[k])
 
-    def rises(k: int, a: int, b: int, way: int) -> bool:
-        """Whether the distance is larger beyond a level stretch at the tilt k, upwards (``way`` 1) or downwards."""
-        here = least(k, a, b)
-        while 0 <= k + way < _TILTS:
-            k, a, b = k + way, wires[0].beside[way][a], wires[1].beside[way][b]
-            if least(k, a, b) != here or way < 0:  # the first tilt of a level stretch stands for all
-                return least(k, a, b) > here
-        return True
-
+    guesses: list[Array] = []
     for k, tilt in enumerate(tilts):
-        for a, b in itertools.product(*(w.at(k) for w in wires)):
-            if not rises(k, a, b, -1) or not rises(k, a, b, 1):
+        for a, b in itertools.product(line.minima(k), jumper.minima(k)):
+            here = height(k, a, b)
+            sides = [height(j, line.slide(j, a), jumper.slide(j, b)) for j in (k - 1, k + 1) if 0 <= j < _TILTS]
+            if min(sides) < here or (k and sides[0] == here):  # the first tilt of a level stretch stands for all
                 continue
             q = np.zeros(SIZE)
-            q[D], q[S], q[U] = least(k, a, b), lever * tilt, lifted[k]
-            for i, w, minimum in ((0, wires[0], a), (2, wires[1], b)):
-                at = w.position[minimum]
-                q[i : i + 2] = w.x[at], 0.5 * (w.over[at] + q[D] - q[U] + w.under[k, at])
-            found.append(q)
-    found.sort(key=lambda q: float(q[D]))
-    return [opened for q in found if (opened := _open(section, q)) is not None]
+            q[D], q[S], q[U] = here, lever * tilt, lifted[k]
+            q[:2], q[2:4] = line.place(k, a, here - lifted[k]), jumper.place(k, b, here - lifted[k])
+            guesses.append(q)
+    guesses.sort(key=lambda q: float(q[D]))
+    step = _CLEAR * min(section.clamp.line.radius, section.clamp.jumper.radius)
+    return [opened for q in guesses if (opened := open_up(section, q, step)) is not None]
 
 
-class _Minima:
-    """Local minima, over a wire's position, of the distance d that the wire allows, all tilts after another.
+@dataclass(frozen=True)
+class _Landscape:
+    """How close a wire lets the splints come: ``least`` (t, n) mm at all tilts and positions ``x`` (n,).
 
-    ``position`` (v,) is the index of the wire's position at each, ``least`` (v,) the distance there, and ``beside[-1]``
-    and ``beside[1]`` (v,) the minimum it slides to when the splint is tilted by one step less and one more.
+    Its centre is then ``over`` (n,) deep in the up splint's groove, ``under`` (t, n) in the down splint's. A wire at
+    position ``outside`` leaves the clamp.
     """
 
-    def __init__(self, section: Section, i: int, tilts: Array) -> None:
+    x: Array
+    over: Array
+    under: Array
+    least: list[list[float]]
+    outside: int
+
+    @classmethod
+    def of(cls, section: Section, i: int, tilts: Array) -> _Landscape:
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.reach(wire)
         face = section.clamp.down_splint.face_depth
-        self.x = np.linspace(low, high, _POSITIONS)
-        self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
+        x = np.linspace(low, high, _POSITIONS)
+        over = _curve(section, up, x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
         deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
         aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
         u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
-        self.under = np.array([_turned(u, v, tilt, bolt, self.x) for tilt in tilts])
-        least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
-        step = downhill(least)
-        row, self.position = np.nonzero(step == 0)
-        key = row * _POSITIONS + self.position
-        self.least = least[row, self.position]
-        self.beside: dict[int, NDArray[np.intp]] = {}
-        for way in (-1, 1):
-            rows = np.clip(row + way, 0, len(tilts) - 1)
-            # Downhill there is the next minimum on that side.
-            after = np.searchsorted(key, rows * _POSITIONS + self.position, side="left")
-            self.beside[way] = np.where(step[rows, self.position] < 0, after - 1, after)
-        self._outside = 0 if i == 0 else _POSITIONS - 1
-        self._first = np.searchsorted(row, np.arange(len(tilts) + 1))
+        under = np.array([_turned(u, v, tilt, bolt, x) for tilt in tilts])
+        least = np.round((over - under) / (_LEVEL * r)) * (_LEVEL * r)
+        return cls(x, over, under, least.tolist(), 0 if i == 0 else _POSITIONS - 1)
 
-    def at(self, k: int) -> list[int]:
-        """The minima at tilt k, but for that in which the wire leaves the clamp."""
-        return [m for m in range(self._first[k], self._first[k + 1]) if self.position[m] != self._outside]
+    def minima(self, k: int) -> list[int]:
+        """Positions of the local minima at tilt k, but for where the wire leaves the clamp; the first of level ones."""
+        row = np.array(self.least[k])
+        starts = np.flatnonzero(np.diff(row, prepend=np.inf))
+        level = np.concatenate([[np.inf], row[starts], [np.inf]])
+        is_low = (level[1:-1] < level[:-2]) & (level[1:-1] < level[2:])
+        return [position for position in starts[is_low].tolist() if position != self.outside]
+
+    def slide(self, k: int, position: int) -> int:
+        """Where a wire at a position slides to when the splint has tilt k."""
+        row = self.least[k]
+        while True:
+            beside = min(max(position - 1, 0), min(position + 1, len(row) - 1), key=row.__getitem__)
+            if row[beside] >= row[position]:
+                return position
+            position = beside
+
+    def place(self, k: int, position: int, d: float) -> tuple[float, float]:
+        """The wire's centre with the down splint at d: in the middle of its room."""
+        return self.x[position], 0.5 * (self.over[position] + d + self.under[k, position])
 
 
 def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:
@@ -123,42 +128,3 @@ def _turned(u: Array, v: Array, tilt: float, bolt: float, x: Array) -> Array:
     c, s = math.cos(tilt), math.sin(tilt)
     along = np.maximum.accumulate(bolt + u * c + v * s)
     return np.interp(x, along, v * c - u * s)
-
-
-def downhill(height: Array) -> NDArray[np.int64]:
-    """Whether each sample of ``height`` (t, n) slides left (-1), right (1) or nowhere (0), along its row.
-
-    What counts is the next other height on either side, the lower one first, and none beyond the ends: a slight slope
-    is a stair. Of a level stretch between higher ones the first sample stands for all.
-    """
-    t, n = height.shape
-    number, changes = np.arange(n), height[:, 1:] != height[:, :-1]
-    first = np.ones((t, 1), np.bool_)
-    starts = np.maximum.accumulate(np.where(np.hstack([first, changes]), number, 0), axis=1)
-    ends = np.minimum.accumulate(np.where(np.hstack([changes, first]), number, n)[:, ::-1], axis=1)[:, ::-1]
-    fenced = np.pad(height, ((0, 0), (1, 1)), constant_values=np.inf)
-    left = np.take_along_axis(fenced, starts, axis=1)  # of the sample before the stretch: fenced is one ahead
-    right = np.take_along_axis(fenced, ends + 2, axis=1)
-    slides_left = (left < height) | (starts < number)
-    return np.where((right < height) & (right <= left), 1, np.where(slides_left, -1, 0))
-
-
-def _tilted(section: Section, tilt: float) -> Array:
-    """The state (10,) with a tilt alone."""
-    q = np.zeros(SIZE)
-    q[S] = section.lever * tilt
-    return q
-
-
-def _open(section: Section, q: Array) -> Array | None:
-    """The state opened until nothing overlaps; None if that is not near."""
-    r = min(section.pairs["P1", wire].cylinder.radius for wire in WIRES)
-    for _ in range(30):
-        lacking = float(section.gaps(q).value.min())
-        if lacking >= -_ROUNDING * r:
-            return q
-        more = max(2.0 * -lacking, _CLEAR * r)
-        q = q.copy()
-        q[D] += more
-        q[[1, 3]] += 0.5 * more
-    return None

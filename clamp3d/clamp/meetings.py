@@ -14,7 +14,6 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.motions import first_contact
 from clamp3d.engine.moving_pair import MovingPair
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import inverse
@@ -39,30 +38,22 @@ def _meet(
         start, end = (inverse(w.poses[a].T()) @ w.poses[b].T() for w in (before, after))
         if np.array_equal(start, end) or _stay_apart(solids, before, after, (a, b)):
             continue
-        motion = Motion.to_pose(end)
-        way = MovingPair(cache.model(solids[b]), cache.model(solids[a]), motion.resolved(start), start, np.eye(4))
-        near = way.first_time(TOUCHING) is not None  # how near they come otherwise does not matter
-        if near and first_contact(solids[a], solids[b], motion, start, margin=TOUCHING).touches is not False:
+        motion = Motion.to_pose(end).resolved(start)
+        way = MovingPair(cache.model(solids[b]), cache.model(solids[a]), motion, start, np.eye(4))
+        if way.first_time(TOUCHING) is not None:  # how near they come otherwise does not matter
             yield a, b
 
 
 def _stay_apart(solids: dict[PartName, Solid], before: Waypoint, after: Waypoint, pair: Pair) -> bool:
-    """Whether balls about the parts' origins stay apart, or the parts pass each other along the wires."""
-    (a, c), (b, d) = ((before.poses[name], after.poses[name]) for name in pair)
-    reach = sum(_reach(solids[name]) for name in pair)
-    return _least_distance((b.x - a.x, b.y - a.y), (d.x - c.x, d.y - c.y)) > reach + TOUCHING
+    """Whether balls about the parts' origins stay apart in the section."""
+    places = [[(w.poses[name].x, w.poses[name].y) for name in pair] for w in (before, after)]
+    apart = np.diff(places, axis=1)[:, 0]
+    move = apart[1] - apart[0]
+    t = np.clip(-(apart[0] @ move) / max(move @ move, 1e-300), 0.0, 1.0)
+    return bool(np.hypot(*(apart[0] + t * move)) > sum(_reach(solids[name]) for name in pair) + TOUCHING)
 
 
 def _reach(solid: Solid) -> float:
     """How far a part's section reaches from its origin at most, mm."""
-    corners = [
-        body.support(np.array(v)) for body in solid.bodies for v in ((1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1))
-    ]
-    return math.sqrt(2.0) * max(corners)
-
-
-def _least_distance(start: tuple[float, float], end: tuple[float, float]) -> float:
-    """Of the origin from the segment between two points, mm."""
-    (x, y), (dx, dy) = start, (end[0] - start[0], end[1] - start[1])
-    t = min(max(-(x * dx + y * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
-    return math.hypot(x + t * dx, y + t * dy)
+    axes = np.array([(1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)])
+    return math.sqrt(2.0) * max(body.support(axis) for body in solid.bodies for axis in axes)

@@ -4,51 +4,77 @@ Everything is seen from the up splint (P1 at rest), in the paper's section frame
 wire centres x6, y6, x7, y7; d, how far below P1's origin the down splint's stands when it rests in the saddle's apex
 (the bolt draws the saddle, and d is where that is); s = half width * tilt; the shifts b of the bolt in the up splint's
 hole, v of the saddle on the bolt and w of the down splint in the saddle, 0 unless the clamp's joints have play; and u,
-how high the round back stands over the saddle's arc, 0 unless the saddle's edges lift it off.
+how high the down splint stands over the saddle's apex.
+
+In every gap a part with a surface meets one with a round (a wire, the round back) or a corner. So all gaps have one
+formula for their derivatives: by the velocities of both parts at the contact, and by the gap's curvature.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
-from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
 from clamp3d.geometry.pose import Array, SectionPose
 from clamp3d.kernel.contact_model import GroovePair
 
+_INDEX = {name: i for i, name in enumerate(PARTS)}
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
 WIRES: tuple[PartName, PartName] = ("P6", "P7")
 D, S, B, V, W, U = 4, 5, 6, 7, 8, 9
-"""Where the distance, the scaled tilt, the shifts of bolt, saddle and down splint, and its height over the saddle's arc
-stand in the state q."""
+"""Where the distance, the scaled tilt, the shifts of bolt, saddle and down splint, and its height over the saddle's
+apex stand in the state q."""
 SIZE = 10
 """Coordinates of a state."""
+HELD = (0, 1, 2, 3, D, S, U)
+"""Coordinates that move while the down splint is closed by hand: what play the joints have the nut takes up."""
 
 EDGE = "outer edge"
 """Feature of a splint's gap to a wire that has left its face sideways."""
 EDGES = "saddle's edge"
 """Feature of the gap between the down splint's underside and the saddle."""
-SEAT = "arc"
-"""Feature of the gap between the round back and the saddle's arc: the last one of `Section.gaps`."""
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
+_ADVANCES = 100
+_FAR = 1e3
+"""Gap in mm of a piece that another one stands for."""
+_FULL = 1e-9
+"""Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
+Point = Sequence[float]
+"""Right and down in a section, mm."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Values (k,) mm of the gaps at a state, their derivatives (k, 10) by q (dimensionless), and what each one is.
+    """The gaps at a state, row by row.
 
-    ``pair`` names the two parts, ``feature`` the piece; ``point`` (k, 2) is on one of them and ``normal`` (k, 2) leads
-    from the first to the second, in P1's section frame (right, down).
+    Attributes
+    ----------
+    value : ndarray (k,)
+        Mm.
+    gradient : ndarray (k, 10)
+        Derivatives by q.
+    pair, feature : tuple
+        The two parts, and the piece that is nearest.
+    point, normal : ndarray (k, 2)
+        On one of the parts, and from the first part to the second; P1's section frame (right, down).
+    round : tuple of str
+        Which of the two parts is the round or has the corner.
+    centre : ndarray (k, 2)
+        Of the round, or the corner.
+    curvature : ndarray (k,)
+        Second derivative of the gap by motion of the round along the surface, 1/mm.
     """
 
     value: Array
@@ -57,88 +83,49 @@ class Gaps:
     feature: tuple[str, ...]
     point: Array
     normal: Array
-
-
-_RIGHT_DOWN = np.array([1.0, -1.0])
-"""Times a part's X and Z: its section coordinates."""
-_FAR = 1e3
-"""Gap in mm of a piece that another one stands for."""
-Point = Sequence[float]
-"""Right and down in a section, mm."""
+    round: tuple[PartName, ...]
+    centre: Array
+    curvature: Array
 
 
 @dataclass(slots=True)
 class _Gap:
-    """One of `Gaps`; ``gradient`` has the length 10."""
+    """One of `Gaps`; ``normal`` leads from ``surface`` to ``round``."""
 
-    pair: Pair
+    surface: PartName
+    round: PartName
     feature: str
     value: float
-    gradient: list[float]
     point: Point
     normal: Point
+    centre: Point
+    curvature: float = 0.0
 
 
-@dataclass(slots=True)
-class _Pieces:
-    """Pieces of a contact model in a splint's own axes (right, down): gaps in mm, points, normals and names."""
-
-    value: list[float]
-    point: list[Point]
-    normal: list[Point]
-    feature: list[str]
-
-
-@dataclass(frozen=True, slots=True)
-class _Down:
-    """Where P2 stands, seen from P1: place in mm, cosine and sine of its angle, derivatives of its lift by w."""
+class _Frame(NamedTuple):
+    """Where a part stands, seen from P1: place in mm, cosine and sine of its angle."""
 
     x: float
     y: float
-    cos: float
-    sin: float
-    slope: float
-    bend: float
-    lever: float
+    cos: float = 1.0
+    sin: float = 0.0
 
     def seen(self, x: float, y: float) -> tuple[float, float]:
-        """A point of P1's axes in P2's."""
+        """A point of P1's axes in the part's."""
         dx, dy = x - self.x, y - self.y
         return dx * self.cos - dy * self.sin, dx * self.sin + dy * self.cos
 
     def turned(self, u: float, v: float) -> tuple[float, float]:
-        """A direction of P2's axes in P1's."""
+        """A direction of the part's axes in P1's."""
         return u * self.cos + v * self.sin, v * self.cos - u * self.sin
 
     def point(self, u: float, v: float) -> tuple[float, float]:
-        """A point of P2's axes in P1's."""
+        """A point of the part's axes in P1's."""
         x, y = self.turned(u, v)
         return x + self.x, y + self.y
 
-    def gradient(self, by_x: float, by_y: float, by_angle: float) -> list[float]:
-        """Derivatives by the state of what changes so with P2's place and angle."""
-        by_w = by_x - self.slope * by_y
-        return [0.0, 0.0, 0.0, 0.0, by_y, by_angle / self.lever, by_x, by_x, by_w, -by_y]
 
-
-_AT_REST = _Down(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-
-
-def _at_wire(i: int, nx: float, ny: float, gradient: list[float]) -> list[float]:
-    """A gradient, with what the place of the wire at the coordinates i, i + 1 changes."""
-    gradient[i], gradient[i + 1] = nx, ny
-    return gradient
-
-
-def _collect(rows: list[_Gap]) -> Gaps:
-    return Gaps(
-        np.array([row.value for row in rows]),
-        np.array([row.gradient for row in rows]),
-        tuple(row.pair for row in rows),
-        tuple(row.feature for row in rows),
-        np.array([row.point for row in rows]),
-        np.array([row.normal for row in rows]),
-    )
+_AT_REST = _Frame(0.0, 0.0)
 
 
 @dataclass
@@ -183,46 +170,59 @@ class Section:
         return (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
 
     @cached_property
-    def play(self) -> tuple[float, float]:
-        """How far the bolt may shift in the up splint's hole, and the saddle on the bolt; mm."""
-        up, saddle, bolt = self.clamp.up_splint, self.clamp.saddle, self.clamp.bolt
-        return 0.5 * (up.hole_diameter - bolt.diameter), 0.5 * (saddle.hole_diameter - bolt.diameter)
+    def least_slack(self) -> float:
+        """Least difference of a wire's and its groove's radius in mm."""
+        return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
 
-    def lift(self, w: float) -> tuple[float, float, float]:
-        """How much higher the down splint rests when shifted by ``w`` in the saddle, mm, and its two derivatives.
-
-        The round back rolls in the saddle's arc, and beyond it on a lip.
-        """
-        aside = abs(w)
-        c, r, saddle = self.clamp.back_clearance, self.clamp.down_splint.back_radius, self.clamp.saddle
-        to_lip = 0.5 * saddle.width - aside
-        if r * aside <= c * to_lip:  # the arc's end, where both centres and the lip are on one line
-            rest = math.sqrt(c * c - aside * aside)
-            return aside * aside / (c + rest), math.copysign(aside / rest, w), c * c / rest**3
-        rest = math.sqrt(max(r * r - to_lip * to_lip, 1e-12 * r * r))
-        return rest - self._edge_below, math.copysign(to_lip / rest, w * to_lip), -r * r / rest**3
-
-    def lifted(self, tilt: Array) -> Array:
-        """How high (n,) over its arc the centred saddle's edges hold the down splint at a tilt (n,) in rad; mm."""
-        half, under = 0.5 * self.clamp.saddle.width, self.clamp.down_splint.underside_depth
-        return np.maximum(0.0, (under + half * np.abs(np.sin(tilt))) / np.cos(tilt) - self._edge_below)
+    @cached_property
+    def _twists(self) -> Array:
+        """How the parts (7,) move right and down (mm) and turn (rad) with q and the turns of both wires over their
+        radius: (7, 3, 12)."""
+        twist = np.zeros((len(PARTS), 3, SIZE + len(WIRES)))
+        for i, wire in enumerate(WIRES):
+            part = _INDEX[wire]
+            twist[part, [0, 1], [2 * i, 2 * i + 1]] = 1.0
+            twist[part, 2, SIZE + i] = 1.0 / self.pairs["P1", wire].cylinder.radius
+        for name, shifts in (("P4", [B]), ("P3", [B, V]), ("P2", [B, V, W])):
+            twist[_INDEX[name], 0, shifts] = 1.0
+        twist[1:3, 1, D] = 1.0
+        twist[1, [1, 2], [U, S]] = -1.0, 1.0 / self.lever
+        return twist
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
         down = self._down(q)
         return SectionPose(down.x, down.y, float(q[S]) / self.lever)
 
-    def _down(self, q: Array) -> _Down:
-        _, _, _, _, d, scaled, b, v, w, u = q.tolist()
-        lift, slope, bend = self.lift(w)
-        angle = scaled / self.lever
-        x, y = self.bolt_x + b + v + w, d - lift - u
-        return _Down(x, y, math.cos(angle), math.sin(angle), slope, bend, self.lever)
+    def _down(self, q: Array) -> _Frame:
+        angle = float(q[S]) / self.lever
+        x, y = self.bolt_x + float(q[B] + q[V] + q[W]), float(q[D] - q[U])
+        return _Frame(x, y, math.cos(angle), math.sin(angle))
 
-    @property
-    def least_slack(self) -> float:
-        """Least difference of a wire's and its groove's radius in mm."""
-        return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
+    def poses(self, q: Array, saddle_d: float | None = None) -> dict[PartName, SectionPose]:
+        """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
+        clamp, down = self.clamp, self.down_splint(q)
+        x, y = -float(q[0]), -float(q[1])
+        saddle_y = y + (float(q[D]) if saddle_d is None else saddle_d) - clamp.back_clearance
+        bolt_y = saddle_y + clamp.saddle.radius + clamp.saddle.apex_thickness - clamp.bolt.shank_length
+        bolt_x = x + self.bolt_x + float(q[B])
+        return {
+            "P1": SectionPose(x, y),
+            "P2": SectionPose(x + down.x, y + down.y, down.angle),
+            "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
+            "P4": SectionPose(bolt_x, bolt_y),
+            "P5": SectionPose(bolt_x, y - clamp.nut.height),
+            "P6": SectionPose(0.0, 0.0),
+            "P7": SectionPose(x + float(q[2]), y + float(q[3])),
+        }
+
+    def state(self, poses: Mapping[PartName, SectionPose]) -> Array:
+        """The state (10,) of splints and wires at section poses; the saddle counts as under the down splint."""
+        q, up, down = np.zeros(SIZE), poses["P1"], poses["P2"]
+        for i, wire in enumerate(WIRES):
+            q[2 * i : 2 * i + 2] = poses[wire].x - up.x, poses[wire].y - up.y
+        q[D], q[S], q[W] = down.y - up.y, self.lever * (down.angle - up.angle), down.x - up.x - self.bolt_x
+        return q
 
     def mouth(self, wire: PartName) -> tuple[float, float]:
         """Where the up splint's groove begins and ends on its inner face, x in mm."""
@@ -238,15 +238,10 @@ class Section:
             return -r, self.bolt_x - bolt - r
         return self.bolt_x + bolt + r, self.clamp.up_splint.width + r
 
-    def wire_limits(self, q: Array, wire: PartName) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Limits of a wire's (x, y) at a state: its mouth, and the bottoms of the two grooves that face each other.
-
-        Parts of finite size are free behind their grooves too; a search must not put the wire there.
-        """
-        up, down = self.pairs["P1", wire], self.pairs["P2", wire]
-        top = -up.T_a_groove[2, 3] - up.groove.radius
-        centre = self.down_splint(q).point(down.T_a_groove[0, 3], -down.T_a_groove[2, 3])[1]
-        return self.mouth(wire), (float(top), centre + down.groove.radius)
+    def arc_centres(self, q: Array, wire: PartName) -> tuple[Array, Array]:
+        """Centres (2,) of the wire's arcs in the up and the down splint, mm."""
+        up, down = self.pairs["P1", wire].T_a_groove, self.pairs["P2", wire].T_a_groove
+        return np.array([up[0, 3], -up[2, 3]]), np.array(self.down_splint(q).point(down[0, 3], -down[2, 3]))
 
     def splint_distance(self, q: Array) -> float:
         """Height between the inner edges of the splints on the line side (the distance of Table 4); mm."""
@@ -255,12 +250,10 @@ class Section:
 
     def escaped(self, q: Array) -> tuple[PartName, ...]:
         """The wires whose centre is beside a splint: nothing leads them back."""
-        half, pose = self.clamp.down_splint.width / 2, self.down_splint(q)
-        c, s = math.cos(pose.angle), math.sin(pose.angle)
-        found = []
+        half, pose, found = self.clamp.down_splint.width / 2, self.down_splint(q), []
         for i, wire in enumerate(WIRES):
             x, y = float(q[2 * i]), float(q[2 * i + 1])
-            u = (x - pose.x) * c - (y - pose.y) * s
+            u = (x - pose.x) * math.cos(pose.angle) - (y - pose.y) * math.sin(pose.angle)
             if not (0.0 <= x <= self.clamp.up_splint.width and abs(u) <= half):
                 found.append(wire)
         return tuple(found)
@@ -275,8 +268,7 @@ class Section:
         q[D], q[S] = d, self.lever * tilt
         pose = self.down_splint(q)
         for i, wire in enumerate(WIRES):
-            up, down = self.pairs["P1", wire].T_a_groove, self.pairs["P2", wire].T_a_groove
-            q[2 * i : 2 * i + 2] = 0.5 * (np.array([up[0, 3], -up[2, 3]]) + pose.point(down[0, 3], -down[2, 3]))
+            q[2 * i : 2 * i + 2] = 0.5 * np.add(*self.arc_centres(q, wire))
             for low, high in (self.mouth(wire), self.reach(wire)):
                 q[2 * i] = min(max(q[2 * i], low), high)
             r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
@@ -293,141 +285,130 @@ class Section:
         spare = min(_SPARE, _SPARE_OF_LEVER * self.lever)
         return up.thickness - down.face_depth + thickest + self.lever * math.sin(self.clamp.tilt_stop) + spare
 
+    def gaps(self, q: Array) -> Gaps:
+        """All gaps at a state: both wires, inner faces, stops, and the round back in the saddle."""
+        down = self._down(q)
+        stops = [*self._faces(down), *self._stops(q, down), *self._groove("P3", "P2", q, down)]
+        return self._collect(q, [*self._wire("P6", q, down), *self._wire("P7", q, down), *stops])
+
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return _collect(self._wire(q, self._down(q), wire))
-
-    def gaps(self, q: Array) -> Gaps:
-        """All gaps at a state: both wires, faces, stops."""
-        down = self._down(q)
-        return _collect([*self._wire(q, down, "P6"), *self._wire(q, down, "P7"), *self._stops(q, down)])
+        return self._collect(q, self._wire(wire, q, self._down(q)))
 
     def face_gap(self, q: Array) -> float:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
         return min(row.value for row in self._faces(self._down(q)))
 
-    def _wire(self, q: Array, down: _Down, wire: PartName) -> list[_Gap]:
-        """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
-        i, rows = 2 * WIRES.index(wire), []
-        x, y = q[i : i + 2].tolist()
-        up = self._pieces("P1", wire, x, y)
-        for gap, point, (nx, ny), feature in zip(up.value, up.point, up.normal, up.feature, strict=True):
-            rows.append(_Gap(("P1", wire), feature, gap, _at_wire(i, nx, ny, [0.0] * SIZE), point, (nx, ny)))
-        below = self._pieces("P2", wire, *down.seen(x, y), down.cos, down.sin)
-        for gap, (pu, pv), (nu, nv), feature in zip(below.value, below.point, below.normal, below.feature, strict=True):
-            nx, ny = down.turned(nu, nv)
-            gradient = _at_wire(i, nx, ny, down.gradient(-nx, -ny, nv * pu - nu * pv))
-            rows.append(_Gap(("P2", wire), feature, gap, gradient, down.point(pu, pv), (nx, ny)))
-        side, axis, shank = (-1.0 if wire == "P6" else 1.0), self.bolt_x + float(q[B]), 0.5 * self.clamp.bolt.diameter
-        gap, gradient = side * (x - axis) - shank - self.pairs["P1", wire].cylinder.radius, [0.0] * SIZE
-        gradient[i], gradient[B] = side, -side
-        return [*rows, _Gap(("P4", wire), "shank", gap, gradient, (axis + side * shank, y), (side, 0.0))]
+    def seated(self, q: Array) -> Array:
+        """The state with the saddle drawn up to the round back, as the contact model sees them."""
+        q = q.copy()
+        for _ in range(_ADVANCES):
+            gap = min(row.value for row in self._groove("P3", "P2", q, self._down(q)))
+            if abs(gap) <= 1e-12 * self.clamp.saddle.radius:
+                break
+            q[[D, U]] -= gap
+        return q
 
-    def _faces(self, down: _Down) -> list[_Gap]:
-        """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
-        up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
-        c, s = down.cos, down.sin
-        for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
-            (corner, corner_y), edge = down.point(side * self.lever, face), self.bolt_x + side * 0.5 * up.width
-            if side * (corner - edge) <= 0.0:  # P2's corner under P1's face
-                gradient = down.gradient(0.0, 1.0, down.x - corner)
-                gap, point, normal = corner_y - up.thickness, (corner, up.thickness), (0.0, 1.0)
-            else:  # P1's edge over P2's face
-                x, y = edge - down.x, up.thickness - down.y
-                gradient = down.gradient(s, c, y * s - x * c)
-                gap, point, normal = face - (x * s + y * c), (edge, up.thickness), (s, c)
-            rows.append(_Gap(("P1", "P2"), feature, gap, gradient, point, normal))
-        return rows
+    def work(self, q: Array, pair: Sequence[Pair], point: Array, push: Array) -> Array:
+        """Work (k, 12) of ``push`` (k, 2) on the second part of each pair at ``point`` (k, 2), and of its reaction on
+        the first, for unit changes of q and of the turns of both wires over their radius."""
+        origin, down = np.zeros((len(PARTS), 2)), self._down(q)
+        origin[1], origin[5], origin[6] = (down.x, down.y), q[:2], q[2:4]
+        total = 0.0
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            part = [_INDEX[names[side]] for names in pair]
+            arm = point - origin[part]
+            moment = push[:, 0] * arm[:, 1] - push[:, 1] * arm[:, 0]
+            total = total + sign * np.einsum("kj,kjn->kn", np.column_stack([push, moment]), self._twists[part])
+        return np.asarray(total)
 
-    def _stops(self, q: Array, down: _Down) -> list[_Gap]:
-        """Gaps of the inner faces, then what ends the down splint's tilt and slide, and carries it (Table 2 of the
-        paper): its underside on the saddle's edges, its slot on the shank, the play of hole and washer where there is
-        any, and its round back in the saddle's arc."""
-        rows, joints, splint = self._faces(down), self.clamp.joints, self.clamp.down_splint
-        # Centred, the slot's lower ends meet the shank first.
-        depths = (splint.slot_bottom, splint.face_depth) if joints.washer or joints.saddle else (splint.slot_bottom,)
-        axis, shank, (play, washer_play) = self.bolt_x + float(q[B]), 0.5 * self.clamp.bolt.diameter, self.play
-        for side in (-1.0, 1.0):
-            rows.append(self._saddle_edge(q, down, side))
-            for depth in depths:
-                x, y = down.point(side * 0.5 * splint.slot_width, depth)
-                gradient = down.gradient(side, 0.0, side * (y - down.y))
-                gradient[B] = 0.0  # bolt and splint shift together
-                rows.append(_Gap(("P2", "P4"), "slot", side * (x - axis) - shank, gradient, (x, y), (-side, 0.0)))
-            if joints.hole:
-                gradient, point = [0.0] * SIZE, (axis + side * shank, 0.5 * self.clamp.up_splint.thickness)
-                gradient[B] = -side
-                rows.append(_Gap(("P1", "P4"), "hole", play - side * float(q[B]), gradient, point, (-side, 0.0)))
-            if joints.washer:
-                gradient, point = [0.0] * SIZE, (axis - side * shank, float(q[D]) + splint.back_radius)
-                gradient[V] = -side
-                rows.append(_Gap(("P3", "P4"), "hole", washer_play - side * float(q[V]), gradient, point, (side, 0.0)))
-        return [*rows, self._seat(q, down)]
+    def hessian(self, q: Array, gaps: Gaps, force: Array) -> Array:
+        """Second derivatives (10, 10) of ``force`` (k,) times the gaps by q.
 
-    def _saddle_edge(self, q: Array, down: _Down, side: float) -> _Gap:
-        """The down splint's underside on an edge of the saddle, whose arc's centre is back_clearance above q's d."""
-        edge = self.bolt_x + float(q[B] + q[V]) + side * 0.5 * self.clamp.saddle.width
-        edge_y = float(q[D]) + self._edge_below
-        x, y, c, s = edge - down.x, edge_y - down.y, down.cos, down.sin
-        gradient = down.gradient(-s, -c, x * c - y * s)
-        gradient[D] += c
-        gradient[B] += s
-        gradient[V] += s
-        gap = x * s + y * c - self.clamp.down_splint.underside_depth
-        return _Gap(("P2", "P3"), EDGES, gap, gradient, (edge, edge_y), (s, c))
-
-    def _seat(self, q: Array, down: _Down) -> _Gap:
-        """The round back's height over the saddle's arc, square to it."""
-        u, upright, gradient = float(q[U]), 1.0 / math.hypot(1.0, down.slope), [0.0] * SIZE
-        gradient[W], gradient[U] = -u * down.slope * down.bend * upright**3, upright
-        normal, back = (down.slope * upright, upright), self.clamp.down_splint.back_radius
-        point = (down.x + back * normal[0], down.y + back * normal[1])
-        return _Gap(("P2", "P3"), SEAT, u * upright, gradient, point, normal)
-
-    def wire_curvature(self, q: Array, splint: PartName, wire: PartName, force: Array, h: float) -> Array:
-        """Second derivatives (10, 10) by q of ``force`` (k,) times a wire's gaps to a splint.
-
-        The normals turn with the wire's place (u, v) in the splint's own axes: differences over ``h`` mm. How u and v
-        follow from q is written out.
+        A round that moves along a surface changes the gap by its curvature, and where the down splint turns, the arm
+        from its origin turns with it, or the surface's normal.
         """
-        i, down = 2 * WIRES.index(wire), self._down(q) if splint == "P2" else _AT_REST
-        turn = np.array([[down.cos, -down.sin], [down.sin, down.cos]])
-        u, v = down.seen(float(q[i]), float(q[i + 1]))
+        down, total = self._down(q), np.zeros((SIZE, SIZE))
+        twists = self._twists[:, :, :SIZE]
+        turn = twists[1, 2]
 
-        def push(u: float, v: float) -> Array:
-            return np.asarray(force @ np.array(self._pieces(splint, wire, u, v, down.cos, down.sin).normal))
+        def velocity(part: PartName, at: Array) -> Array:
+            right, below = at - (down.x, down.y) if part == "P2" else (0.0, 0.0)
+            return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn * (part == "P2")))
 
-        right, left, under, over = (push(u + du, v + dv) for du, dv in ((h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)))
-        turning = np.column_stack([right - left, under - over]) / (2.0 * h)
-        by_q, curvature = np.zeros((2, SIZE)), np.zeros((SIZE, SIZE))
-        by_q[:, i : i + 2] = turn
-        if splint == "P2":
-            by_q[:, B : W + 1] = -turn[:, :1]
-            by_q[:, [D, U]] = np.column_stack([-turn[:, 1], turn[:, 1]])
-            by_q[:, W] += down.slope * turn[:, 1]
-            by_q[:, S] = np.array((-v, u)) / self.lever
-            along, deep = push(u, v).tolist()
-            curvature[S] = (deep * by_q[0] - along * by_q[1]) / self.lever
-            curvature += curvature.T
-            curvature[S, S] *= 0.5
-            curvature[W, W] += down.bend * (along * turn[0, 1] + deep * turn[1, 1])
-        return np.asarray(by_q.T @ turning @ by_q + curvature)
+        for k in np.flatnonzero(force):
+            is_second = gaps.round[k] == gaps.pair[k][1]
+            surface, (x, y) = gaps.pair[k][not is_second], gaps.normal[k] * (1.0 if is_second else -1.0)
+            move, centre = velocity(gaps.round[k], gaps.centre[k]), gaps.centre[k]
+            along = np.array([-y, x]) @ (move - velocity(surface, centre))
+            own = gaps.curvature[k] * np.outer(along, along)
+            if "P2" in gaps.pair[k]:
+                own -= ((x, y) @ (centre - (down.x, down.y))) * np.outer(turn, turn)
+            if surface == "P2":
+                right, below = move - twists[1, :2]
+                cross = np.outer(turn, x * below - y * right)
+                own -= cross + cross.T
+            total += force[k] * own
+        return np.asarray(total)
 
-    def _pieces(self, splint: PartName, wire: PartName, u: float, v: float, c: float = 1.0, s: float = 0.0) -> _Pieces:
-        """The model's pieces for a wire at (u, v) in the splint's own axes (right, down), which is turned by (c, s)."""
-        self.queries.contact += 1
+    def _collect(self, q: Array, rows: list[_Gap]) -> Gaps:
+        pair = tuple((r.surface, r.round) if r.surface < r.round else (r.round, r.surface) for r in rows)
+        point, normal = np.array([r.point for r in rows]), np.array([r.normal for r in rows])
+        normal[[r.surface > r.round for r in rows]] *= -1.0
+        return Gaps(
+            value=np.array([r.value for r in rows]),
+            gradient=self.work(q, pair, point, normal)[:, :SIZE],
+            pair=pair,
+            feature=tuple(r.feature for r in rows),
+            point=point,
+            normal=normal,
+            round=tuple(r.round for r in rows),
+            centre=np.array([r.centre for r in rows]),
+            curvature=np.array([r.curvature for r in rows]),
+        )
+
+    def _wire(self, wire: PartName, q: Array, down: _Frame) -> list[_Gap]:
+        """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
+        i, side, axis = 2 * WIRES.index(wire), (-1.0 if wire == "P6" else 1.0), self.bolt_x + float(q[B])
+        (x, y), shank = q[i : i + 2].tolist(), 0.5 * self.clamp.bolt.diameter
+        gap = side * (x - axis) - shank - self.pairs["P1", wire].cylinder.radius
+        bolt = _Gap("P4", wire, "shank", gap, (axis + side * shank, y), (side, 0.0), (x, y))
+        return [*self._groove("P1", wire, q, down), *self._groove("P2", wire, q, down), bolt]
+
+    def _groove(self, part: PartName, inside: PartName, q: Array, down: _Frame) -> list[_Gap]:
+        """The contact model's pieces of a groove for the wire or the round back that lies in it."""
+        pair, frame = self.pairs[part, inside], down if part == "P2" else _AT_REST
+        if inside == "P2":
+            centre, c, s = (down.x, down.y), down.cos, -down.sin
+            frame = _Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
+        else:
+            self.queries.contact += 1
+            i = 2 * WIRES.index(inside)
+            centre, c, s = (float(q[i]), float(q[i + 1])), frame.cos, frame.sin
+        u, v = frame.seen(*centre)
         T = np.array([[c, 0.0, s, u], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -v], [0.0, 0.0, 0.0, 1.0]])
-        pieces = self.model.pieces(self.pairs[splint, wire], T)
-        points, normals = ((array[:, ::2] * _RIGHT_DOWN).tolist() for array in (pieces.point, pieces.normal))
-        rows = _Pieces(pieces.distance.tolist(), points, normals, list(pieces.feature))
-        self._end_face(rows, splint, wire, u, v)
+        pieces, r, R = self.model.pieces(pair, T), pair.cylinder.radius, pair.groove.radius
+        rows = []
+        points, normals = pieces.point.tolist(), pieces.normal.tolist()
+        for gap, point, normal, feature in zip(pieces.distance.tolist(), points, normals, pieces.feature, strict=True):
+            bend = 0.0
+            if feature.startswith("arc"):
+                bend = -1.0 / max(abs(R - r - gap), _FULL * R)
+            elif feature.startswith("lip"):
+                bend = 1.0 / max(r + gap, _FULL * R)
+            rows.append(_Gap(part, inside, feature, gap, (point[0], -point[2]), (normal[0], -normal[2]), centre, bend))
+        if inside != "P2":
+            self._end_face(rows, u, v)
+        for row in rows:
+            row.point, row.normal = frame.point(*row.point), frame.turned(*row.normal)
         return rows
 
-    def _end_face(self, rows: _Pieces, splint: PartName, wire: PartName, u: float, v: float) -> None:
-        """A splint's faces end at its outer edge: beside it that is the nearest piece in ``rows``.
+    def _end_face(self, rows: list[_Gap], u: float, v: float) -> None:
+        """A splint's faces end at its outer edge: beside it that is the nearest piece to a wire at (u, v).
 
         Pieces that are nearer than the edge stand `_FAR` away: the groove's material has no end.
         """
+        splint, wire = rows[0].surface, rows[0].round
         side = -1.0 if wire == "P6" else 1.0
         if splint == "P1":
             edge, height, looks = self.bolt_x + side * self.bolt_x, self.clamp.up_splint.thickness, 1.0
@@ -438,14 +419,52 @@ class Section:
             return
         above = max(looks * (v - height), 0.0)
         away = math.hypot(beyond, above)
-        gap, nearest = away - self.pairs[splint, wire].cylinder.radius, rows.value.index(min(rows.value))
-        rows.value = [_FAR if value < gap else value for value in rows.value]
-        rows.value[nearest], rows.feature[nearest] = gap, EDGE
-        rows.point[nearest] = (edge, height if above > 0.0 else v)
-        rows.normal[nearest] = (side * beyond / away, looks * above / away)
+        nearest = min(rows, key=lambda row: row.value)
+        gap = away - self.pairs[splint, wire].cylinder.radius
+        for row in rows:
+            row.value = _FAR if row.value < gap else row.value
+        nearest.value, nearest.feature, nearest.curvature = gap, EDGE, 1.0 / away if above > 0.0 else 0.0
+        nearest.point, nearest.normal = (
+            (edge, height if above > 0.0 else v),
+            (side * beyond / away, looks * above / away),
+        )
 
-    @cached_property
-    def _edge_below(self) -> float:
-        """The saddle's edges below d, mm."""
-        saddle = self.clamp.saddle
-        return saddle.radius * math.cos(saddle.half_angle) - self.clamp.back_clearance
+    def _faces(self, down: _Frame) -> list[_Gap]:
+        """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
+        up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
+        c, s = down.cos, down.sin
+        for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
+            corner, edge = down.point(side * self.lever, face), (self.bolt_x + side * 0.5 * up.width, up.thickness)
+            if side * (corner[0] - edge[0]) <= 0.0:  # P2's corner under P1's face
+                rows.append(_Gap("P1", "P2", feature, corner[1] - up.thickness, corner, (0.0, 1.0), corner))
+            else:  # P1's edge over P2's face
+                gap = face - ((edge[0] - down.x) * s + (edge[1] - down.y) * c)
+                rows.append(_Gap("P2", "P1", feature, gap, edge, (-s, -c), edge))
+        return rows
+
+    def _stops(self, q: Array, down: _Frame) -> list[_Gap]:
+        """What ends the down splint's tilt and slide (Table 2 of the paper): its underside on the saddle's edges, its
+        slot on the shank, and the play of hole and washer where there is any."""
+        rows, clamp, joints = [], self.clamp, self.clamp.joints
+        splint, saddle, up = clamp.down_splint, clamp.saddle, clamp.up_splint
+        # Centred, the slot's lower ends meet the shank first.
+        depths = (splint.slot_bottom, splint.face_depth) if joints.washer or joints.saddle else (splint.slot_bottom,)
+        shift, saddle_shift, d = float(q[B]), float(q[V]), float(q[D])
+        axis, shank = self.bolt_x + shift, 0.5 * clamp.bolt.diameter
+        c, s = down.cos, down.sin
+        edge_y = d + saddle.radius * math.cos(saddle.half_angle) - clamp.back_clearance
+        for side in (-1.0, 1.0):
+            edge = (axis + saddle_shift + side * 0.5 * saddle.width, edge_y)
+            gap = (edge[0] - down.x) * s + (edge[1] - down.y) * c - splint.underside_depth
+            rows.append(_Gap("P2", "P3", EDGES, gap, edge, (s, c), edge))
+            for depth in depths:
+                wall = down.point(side * 0.5 * splint.slot_width, depth)
+                rows.append(_Gap("P4", "P2", "slot", side * (wall[0] - axis) - shank, wall, (side, 0.0), wall))
+            if joints.hole:
+                gap, point = 0.5 * up.hole_diameter - shank - side * shift, (axis + side * shank, 0.5 * up.thickness)
+                rows.append(_Gap("P1", "P4", "hole", gap, point, (-side, 0.0), point))
+            if joints.washer:
+                gap = 0.5 * saddle.hole_diameter - shank - side * saddle_shift
+                point = (axis - side * shank, d + splint.back_radius)
+                rows.append(_Gap("P3", "P4", "hole", gap, point, (side, 0.0), point))
+        return rows

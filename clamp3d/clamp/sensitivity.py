@@ -9,6 +9,7 @@ Table 4 is not d itself: the tilt moves it too.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,7 +20,7 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.section import SIZE, Section
+from clamp3d.clamp.section import SIZE, D, S, Section, U
 from clamp3d.clamp.status import closing_status
 from clamp3d.errors import NotClampedError, SolverError
 from clamp3d.geometry.pose import Array
@@ -139,30 +140,27 @@ def _replaced(part: Any, tree: Mapping[str, Any]) -> Any:
 
 def _derivatives(section: Section, final: FinalState) -> Array:
     """Splint distance by `DIMENSIONS` (n,), through the adjoint of the KKT system."""
-    clamp, q = section.clamp, final.q
+    clamp, q, free = section.clamp, final.q, list(section.free)
     active = np.flatnonzero(final.multipliers)
     # Central differences of closed forms: the step balances rounding and the turn of a normal within the groove.
     h = float((np.spacing(np.abs(q).max()) * section.least_slack**2) ** (1.0 / 3.0))
 
-    free = list(section.free)
-
-    def conditions(at: Section, x: Array) -> Array:
+    def conditions(name: str, by: float) -> Array:
         """Gradient of the Lagrangian (n, up to a constant), active gaps (k), and the splint distance."""
-        gaps = at.gaps(x)
+        at = Section(with_dimensions(clamp, {name: dimension(clamp, name) + by}), section.model)
+        gaps = at.gaps(q)
         gradient = -final.multipliers[active] @ gaps.gradient[active][:, free]
-        return np.array([*gradient, *gaps.value[active], at.splint_distance(x)])
+        return np.array([*gradient, *gaps.value[active], at.splint_distance(q)])
 
-    def changed(name: str, by: float) -> Section:
-        return Section(with_dimensions(clamp, {name: dimension(clamp, name) + by}), section.model)
-
-    by_q = np.column_stack(
-        [conditions(section, q + h * e) - conditions(section, q - h * e) for e in np.eye(SIZE)[free]]
-    )
-    by_p = np.column_stack([conditions(changed(n, h), q) - conditions(changed(n, -h), q) for n in DIMENSIONS])
-    by_q, by_p = by_q / (2.0 * h), by_p / (2.0 * h)
+    by_p = np.column_stack([conditions(n, h) - conditions(n, -h) for n in DIMENSIONS]) / (2.0 * h)
     A, k = final.gaps.gradient[active][:, free], len(active)
-    kkt = np.block([[by_q[: len(free)], -A.T], [A, np.zeros((k, k))]])
-    adjoint, _, rank, _ = np.linalg.lstsq(kkt.T, np.append(by_q[-1], np.zeros(k)), _WELL_POSED)
+    hessian = -section.hessian(q, final.gaps, final.multipliers)[np.ix_(free, free)]
+    kkt = np.block([[hessian, -A.T], [A, np.zeros((k, k))]])
+    # The inner edge moves with the down splint's place and tilt.
+    lever, down, rows = section.lever, clamp.down_splint, np.zeros(SIZE)
+    angle = float(q[S]) / lever
+    rows[[D, U, S]] = 1.0, -1.0, math.cos(angle) - down.face_depth * math.sin(angle) / lever
+    adjoint, _, rank, _ = np.linalg.lstsq(kkt.T, np.append(rows[free], np.zeros(k)), _WELL_POSED)
     if rank < len(kkt):
         raise SolverError("no sensitivity: the final state is not isolated, its KKT matrix is singular")
     return np.asarray(by_p[-1] - adjoint @ by_p[:-1])

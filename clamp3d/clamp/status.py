@@ -6,30 +6,28 @@ The one place that says "clamped": `run`, `check`, `view`, `report`, `export`, `
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from clamp3d.baselines.model import ContactModel
+from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.contact import measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.matrix import PAIRS, Pair
-from clamp3d.clamp.parts import parts
-from clamp3d.clamp.places import section_poses
-from clamp3d.clamp.section import EDGES, SPLINTS, WIRES, D, Section
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.section import EDGE, EDGES, SPLINTS, WIRES, D, Gaps, Section
 from clamp3d.clamp.stepped import SteppedState
 from clamp3d.clamp.surfaces import TOUCHING
-from clamp3d.geometry.pose import SectionPose, inverse
-from clamp3d.kernel.contact_model import GroovePair
+from clamp3d.engine.check import check
+from clamp3d.engine.result import NOT_CLEAN
+from clamp3d.geometry.pose import Array
 
 CLAMPED = "clamped"
 _KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))
 """The bolt stands in the middle of these parts' holes, which are wider, but for what play the section counts."""
+_SAME = 1e-12
+"""Gaps in mm that differ by less are of one place."""
 SeatFeature = Literal["arc", "lip", "flat face", "edge"]
 _DETAILS: dict[SeatFeature, str] = {
     "arc": "seated in the groove",
@@ -98,13 +96,12 @@ class ClosingStatus:
 
 def closing_status(section: Section, final: FinalState | SteppedState, resolution: float = TOUCHING) -> ClosingStatus:
     """What a final state has come to; gaps of a stepped one up to ``resolution`` mm count as closed."""
-    clamp, poses = section.clamp, section_poses(section, final.q)
-    places = seats(clamp, poses, section.model, resolution)
+    places = seats(section, final.q, resolution)
     reason = _not_held(section, final, places, resolution)
-    if not reason and (shortfall := bolt_shortfall(clamp, float(final.q[D]))) > 0.0:
+    if not reason and (shortfall := bolt_shortfall(section.clamp, float(final.q[D]))) > 0.0:
         reason = f"the bolt is {shortfall:.4g} mm too short for the nut"
     if not reason:
-        reason = _overlap(section, final, poses)
+        reason = _overlap(section, final)
     if reason:
         return ClosingStatus(False, f"not {CLAMPED}: {reason}", (), places)
     lips = [seat for seat in places if seat.feature == "lip"]
@@ -113,30 +110,25 @@ def closing_status(section: Section, final: FinalState | SteppedState, resolutio
     return ClosingStatus(True, text, warnings, places)
 
 
-def seats(
-    clamp: Clamp, poses: Mapping[PartName, SectionPose], model: ContactModel, resolution: float = TOUCHING
-) -> tuple[Seat, ...]:
-    """Where each wire stands in each of its grooves, by its distances from arc, lips, face and the face's end.
-
-    Parameters
-    ----------
-    clamp : Clamp
-    poses : dict of SectionPose
-        Where splints and wires are.
-    model : ContactModel
-        Measures the gap.
-    resolution : float
-        Gaps up to this touch, mm.
-    """
-    pairs, found = groove_pairs(clamp), []
+def seats(section: Section, q: Array, resolution: float = TOUCHING) -> tuple[Seat, ...]:
+    """Where each wire stands in each of its grooves; gaps up to ``resolution`` mm touch."""
+    exact, found = Section(section.clamp, Cas()), []
     for splint, wire in itertools.product(SPLINTS, WIRES):
-        pair, T = pairs[splint, wire], inverse(poses[splint].T()) @ poses[wire].T()
-        away, feature = _nearest(clamp, pair, T[0, 3], -T[2, 3])
-        gap = away - pair.cylinder.radius if feature == "edge" else float(model.distances(pair, T[None])[0])
+        gap, _ = _nearest(section.wire_gaps(q, wire), splint)
+        _, feature = _nearest(exact.wire_gaps(q, wire), splint)
         touches = gap <= resolution
         detail = _DETAILS[feature] if touches else "loose"
         found.append(Seat(splint, wire, touches and feature == "arc", gap, detail, feature, touches))
     return tuple(found)
+
+
+def _nearest(gaps: Gaps, splint: PartName) -> tuple[float, SeatFeature]:
+    """The gap to a splint, mm, and what of the splint is nearest: of an arc and the lip that ends it the lip."""
+    own = [k for k, pair in enumerate(gaps.pair) if pair[0] == splint]
+    gap = float(gaps.value[own].min())
+    names = {gaps.feature[k] for k in own if gaps.value[k] <= gap + _SAME}
+    starts: dict[str, SeatFeature] = {"lip": "lip", "arc": "arc", "flat": "flat face", EDGE: "edge"}
+    return gap, next((starts[start] for start in starts if any(n.startswith(start) for n in names)), "arc")
 
 
 def stop_words(stops: Iterable[tuple[Pair, str]]) -> list[str]:
@@ -156,25 +148,6 @@ def bolt_shortfall(clamp: Clamp, d: float) -> float:
     """How far the bolt's end lies below the nut's free face, mm, with the saddle at ``d``; negative: stands out."""
     stack = d + clamp.down_splint.back_radius + clamp.saddle.apex_thickness + clamp.nut.height
     return stack - clamp.bolt.shank_length
-
-
-def _nearest(clamp: Clamp, pair: GroovePair, u: float, v: float) -> tuple[float, SeatFeature]:
-    """How far a wire's axis at (u, v) in a splint's section axes is from its surface, mm, and what is nearest there."""
-    up, side = pair.a == "P1", -1.0 if pair.b == "P6" else 1.0
-    middle, half = (0.5 * clamp.up_splint.width,) * 2 if up else (0.0, 0.5 * clamp.down_splint.width)
-    looks = 1.0 if up else -1.0  # the mouth, down or up
-    groove, centre = pair.groove, pair.T_a_groove[:3, 3]
-    lip, face = groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)
-    x, y = u - float(centre[0]), looks * (v + float(centre[2]))
-    places: list[tuple[float, SeatFeature]] = [(math.hypot(abs(x) - lip, y - face), "lip")]
-    if groove.radius * (groove.half_angle - math.atan2(abs(x), -y)) > TOUCHING:
-        places.append((abs(groove.radius - math.hypot(x, y)), "arc"))
-    beyond = side * (u - middle) - half
-    if beyond > 0.0:
-        return math.hypot(beyond, max(y - face, 0.0)), "edge"
-    if abs(x) > lip + TOUCHING:
-        places.append((abs(y - face), "flat face"))
-    return min(places)
 
 
 def _not_held(section: Section, final: FinalState | SteppedState, places: tuple[Seat, ...], resolution: float) -> str:
@@ -209,28 +182,14 @@ def _beside(places: Iterable[Seat], where: str, what: str, verb: str = "") -> li
     return words
 
 
-def _overlap(section: Section, final: FinalState | SteppedState, poses: dict[PartName, SectionPose]) -> str:
+def _overlap(section: Section, final: FinalState | SteppedState) -> str:
     """The deepest overlap in words: of the section's gaps, or of parts that it does not look at."""
-    gaps = final.gaps
+    gaps, poses = final.gaps, section.poses(final.q)
     k = int(gaps.value.argmin())
     if gaps.value[k] < -TOUCHING:
         return f"{gaps.pair[k][0]} overlaps {gaps.pair[k][1]} by {-gaps.value[k]:.4g} mm"
-    near = _near_pairs(section.clamp, poses, _KEPT_APART | set(gaps.pair))
-    contacts = measure_contacts(section.clamp, poses, section.model, pairs=near) if near else ()
+    rest = [pair for pair in PAIRS if pair not in _KEPT_APART | set(gaps.pair)]
+    scene = clamp_scene(section.clamp, {part: pose.T() for part, pose in poses.items()})
+    clashes = [(row.a, row.b) for row in check(scene, pairs=rest, depths=False).rows if row.verdict in NOT_CLEAN]
+    contacts = measure_contacts(section.clamp, poses, section.model, pairs=clashes) if clashes else ()
     return overlap(min(contacts, key=lambda c: c.gap)) if contacts else ""
-
-
-def _near_pairs(clamp: Clamp, poses: dict[PartName, SectionPose], known: frozenset[Pair]) -> list[Pair]:
-    """Pairs of parts, but for ``known`` ones, whose boxes overlap."""
-    boxes = {}
-    for name, solid in parts(clamp).items():
-        R, p = poses[name].T()[:3, :3], poses[name].T()[:3, 3]
-        high = np.array([max(body.support(R[k]) for body in solid.bodies) for k in range(3)]) + p
-        low = np.array([-max(body.support(-R[k]) for body in solid.bodies) for k in range(3)]) + p
-        boxes[name] = low, high
-    rest = [pair for pair in PAIRS if pair not in known]
-    return [
-        (a, b)
-        for a, b in rest
-        if (boxes[a][0] < boxes[b][1] - TOUCHING).all() and (boxes[b][0] < boxes[a][1] - TOUCHING).all()
-    ]

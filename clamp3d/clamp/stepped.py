@@ -76,6 +76,7 @@ def solve_stepped(
     # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
     free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
     q = max(free, key=lambda p: float(section.gaps(p).value.min()), default=q)
+    q = section.seated(q)
     return SteppedState(q, section.gaps(q), tried)
 
 
@@ -110,6 +111,7 @@ def solve_bisection(
                 turn = max(tilt_step, 2.0 * turn)
             if found is not None and progress is not None:
                 progress(tried, float(found[D]))
+    q = section.seated(q)
     return SteppedState(q, section.gaps(q), tried)
 
 
@@ -148,6 +150,10 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
     from scipy.optimize import minimize  # takes long to import, and the exact solver needs none of it
 
     i = 2 * WIRES.index(wire)
+    # Parts of finite size are free behind their grooves too: the wire stays between the bottoms of both.
+    up, down = section.arc_centres(q, wire)
+    top = float(up[1]) - section.pairs["P1", wire].groove.radius
+    bottom = float(down[1]) + section.pairs["P2", wire].groove.radius
 
     def at(xy: Array) -> Gaps:
         q[i : i + 2] = xy
@@ -167,7 +173,7 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
             lambda x: -x[2],
             np.array([*q[i : i + 2], gaps(q[i : i + 2]).value.min()]),
             jac=lambda x: np.array([0.0, 0.0, -1.0]),
-            bounds=[*section.wire_limits(q, wire), (None, None)],
+            bounds=[section.mouth(wire), (top, bottom), (None, None)],
             constraints={"type": "ineq", "fun": lambda x: gaps(x[:2]).value - x[2], "jac": slack_gradient},
             method="SLSQP",
             options={"maxiter": 60, "ftol": 1e-12},

@@ -8,22 +8,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from clamp3d.clamp.contact import Contact, measure_contacts
+from clamp3d.clamp.contact import Contact, Poses, measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.matrix import PAIRS, Pair
-from clamp3d.clamp.places import Poses, saddle_rise, section_poses
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.section import SIZE, WIRES, D, Section
+from clamp3d.clamp.section import D, Section
 from clamp3d.engine.model import ModelCache
-from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array, SectionPose
 
 Meetings = list[tuple[Pair, Array]]
 """Pairs of parts, each with the state (10,) in which they meet."""
 _SPARE = 20.0
 """Free way in mm between a wire and the open clamp before it comes in."""
-_TOUCH = 1e-10
-_MAX_ADVANCES = 100_000
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,7 @@ class Log:
 
     def touch(self, q: Array, step: str, pair: Pair, travel: float) -> None:
         """Add the event of a contact that is found at state ``q``."""
-        self.measure(section_poses(self.section, q), step, [pair], travel)
+        self.measure(self.section.poses(q), step, [pair], travel)
 
     def measure(self, poses: Poses, step: str, pairs: Sequence[Pair], travel: float, within: float = math.inf) -> None:
         """Add an event for each pair that is no further apart than ``within`` mm."""
@@ -76,7 +72,7 @@ class Log:
             self.measured.update(zip(new, found, strict=True))
         return tuple(self.measured[key] for key in keys)
 
-    def shifted(self, poses: Poses) -> Poses:
+    def shifted(self, poses: Poses) -> dict[PartName, SectionPose]:
         """The poses with those of parts that wait where they wait."""
         return {name: moved(pose, self.aside[name]) if name in self.aside else pose for name, pose in poses.items()}
 
@@ -99,10 +95,10 @@ def approach_line(section: Section, opened: Array, start: Array, step: str, log:
     waiting = settled.copy()
     waiting[2] = settled[0] - beside[0] + clamp.up_splint.width + clamp.jumper.radius + _SPARE
     waiting[3] = middle
-    jumper = section_poses(section, waiting)["P7"]
+    jumper = section.poses(waiting)["P7"]
     for state, label in ((beside, "open clamp beside the line"), (over, "line between the splints")):
-        log.reach(step, label, section_poses(section, state) | {"P7": jumper})
-    log.reach(step, "up splint rests on the line", section_poses(section, waiting))
+        log.reach(step, label, section.poses(state) | {"P7": jumper})
+    log.reach(step, "up splint rests on the line", section.poses(waiting))
     log.touch(waiting, step, ("P1", "P6"), float(opened[1] - start[1]))
     return waiting
 
@@ -111,8 +107,8 @@ def insert_jumper(section: Section, opened: Array, start: Array, step: str, log:
     """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
     inside = start.copy()
     inside[3] = opened[3]
-    log.reach(step, "jumper between the splints", section_poses(section, inside))
-    log.reach(step, "jumper in the up splint's groove", section_poses(section, start))
+    log.reach(step, "jumper between the splints", section.poses(inside))
+    log.reach(step, "jumper in the up splint's groove", section.poses(start))
     log.touch(start, step, ("P1", "P7"), float(opened[3] - start[3]))
 
 
@@ -120,9 +116,9 @@ def close_splints(section: Section, start: Array, end: Array, met: Meetings, ste
     """The down splint closes along its path from ``start`` to ``end``, the saddle left where it was."""
     d = float(start[D])
     for pair, q in met:
-        log.reach(step, f"down splint touches {pair[1]}", section_poses(section, q, saddle_d=d))
+        log.reach(step, f"down splint touches {pair[1]}", section.poses(q, saddle_d=d))
         log.touch(q, step, pair, d - float(q[D]))
-    log.reach(step, "splints closed", section_poses(section, end, saddle_d=d))
+    log.reach(step, "splints closed", section.poses(end, saddle_d=d))
 
 
 def tighten_nut(section: Section, closing: Closing, step: str, log: Log) -> float:
@@ -131,50 +127,17 @@ def tighten_nut(section: Section, closing: Closing, step: str, log: Log) -> floa
     Returns the way that the nut has gone when it is tight, mm.
     """
     clamp, d, held, end = section.clamp, float(closing.start[D]), closing.held, closing.end
-    travel = saddle_rise(section, held, d)
+    travel = d - float(held[D])
     if not np.array_equal(held, end):
-        log.reach(step, "saddle meets the down splint", section_poses(section, held))
+        log.reach(step, "saddle meets the down splint", section.poses(held))
         log.touch(held, step, ("P2", "P3"), travel)
         for pair, q in closing.taken:
             log.touch(q, step, pair, travel + float(held[D] - q[D]))
-        travel = saddle_rise(section, end, d)
-    log.reach(step, "nut tightened", section_poses(section, end))
+        travel = d - float(end[D])
+    log.reach(step, "nut tightened", section.poses(end))
     if np.array_equal(held, end):
         log.touch(end, step, ("P2", "P3"), travel)
     for pair in (("P1", "P5"), ("P3", "P4")):
         if clamp.connection(*pair):
             log.touch(end, step, pair, travel)
     return travel
-
-
-def first_touch(section: Section, q: Array, limit: float) -> Meetings:
-    """Where the down splint, rising straight along the bolt, first touches a wire within ``limit`` mm."""
-    travels = {wire: _rise(section, q, wire, limit) for wire in WIRES}
-    wire = min(travels, key=travels.__getitem__)
-    return [] if travels[wire] >= limit else [(("P2", wire), q - travels[wire] * _unit(D))]
-
-
-def _rise(section: Section, q: Array, wire: PartName, limit: float) -> float:
-    """Travel in mm along the bolt until the down splint touches a wire, ``limit`` if that is further.
-
-    By conservative advancement: no gap can close faster than the motion goes, so advancing by the least gap never
-    passes a contact, however thin. Raises SolverError if the start overlaps or nothing ends the motion.
-    """
-    travel = 0.0
-    for _ in range(_MAX_ADVANCES):
-        gaps = section.wire_gaps(q - travel * _unit(D), wire)
-        gap = min(float(v) for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == "P2")
-        if gap <= _TOUCH:
-            if travel == 0.0 and gap < -_TOUCH:
-                raise SolverError(f"P2 and {wire} overlap by {-gap:.3g} mm before the motion starts")
-            return travel
-        travel += gap
-        if travel >= limit:
-            return limit
-        if gap > 1e6:
-            break
-    raise SolverError(f"{wire} never reaches P2 on its way in; do the grooves face the wires?")
-
-
-def _unit(i: int) -> Array:
-    return np.asarray(np.eye(SIZE)[i])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import Arc, Edge
 from clamp3d.geometry.shapes import Solid
@@ -18,57 +17,40 @@ SURFACES = ("lip", "arc", "hole", "flat face", "round face", "end face")
 """Names of surfaces; of two that touch the one that comes first names the contact."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """A surface of a solid near a point.
-
-    Attributes
-    ----------
-    name : str
-        One of `SURFACES`.
-    distance : float
-        Of the point from it, mm.
-    extrusion : Extrusion
-        The body or hole that it bounds.
-    edge : Edge or None
-        The edge of the outline; None for an end.
-    normal : ndarray (3,) or None
-        Unit vector out of the material in the solid's frame; None where it is not flat.
-    """
+    """A surface of a solid: its ``name``, one of `SURFACES`, and the unit vector (3,) out of it where it is flat."""
 
     name: str
-    distance: float
-    extrusion: Extrusion
-    edge: Edge | None
     normal: Array | None
 
 
-def surfaces_at(solid: Solid, point: Array, tolerance: float = TOUCHING) -> tuple[Surface, ...]:
-    """The surfaces that are nearest to a point (3,) in the solid's frame, to within ``tolerance`` mm."""
-    near: list[Surface] = []
-    for extrusion in (*solid.bodies, *solid.holes):
-        hole = extrusion in solid.holes
-        a, b, along = (np.asarray(point)[:3] @ extrusion.frame).tolist()
-        for edge in extrusion.profile.edges:
-            name = "hole" if hole else _edge_name(edge, a, b)
-            near.append(Surface(name, _edge_distance(edge, a, b), extrusion, edge, _edge_normal(extrusion, edge)))
-        for end, side in ((extrusion.start, -1.0), (extrusion.end, 1.0)) if not hole else ():
-            name = "end face" if extrusion.axis == "Y" else "flat face"
-            near.append(Surface(name, abs(along - end), extrusion, None, side * extrusion.frame[:, 2]))
-    least = min(surface.distance for surface in near)
-    return tuple(surface for surface in near if surface.distance <= least + tolerance)
+def surfaces_at(solid: Solid, T: Array, point: Array, tolerance: float = TOUCHING) -> tuple[Surface, ...]:
+    """The surfaces of a solid at ``T`` (4, 4) that are nearest to a point (3,), to within ``tolerance`` mm.
 
-
-def surface_name(solid: Solid, point: Array, tolerance: float = TOUCHING) -> str:
-    """The surface of a solid that a point (3,) in its own frame is nearest to; a lip is where a concave arc ends.
-
-    Of surfaces that are as near to within ``tolerance`` mm the first of `SURFACES` counts.
+    A lip is where a concave arc ends.
 
     >>> from clamp3d.geometry.shapes import cylinder
-    >>> surface_name(cylinder(5.0, 20.0), np.array([5.0, 0.0, 3.0]))
-    'round face'
+    >>> [surface.name for surface in surfaces_at(cylinder(5.0, 20.0), np.eye(4), np.array([5.0, 0.0, 3.0]))]
+    ['round face']
     """
-    return min((surface.name for surface in surfaces_at(solid, point, tolerance)), key=SURFACES.index)
+    near: list[tuple[float, Surface]] = []
+    local = (point - T[:3, 3]) @ T[:3, :3]
+    for extrusion in (*solid.bodies, *solid.holes):
+        is_hole = extrusion in solid.holes
+        frame = T[:3, :3] @ extrusion.frame
+        a, b, along = (local @ extrusion.frame).tolist()
+        for edge in extrusion.profile.edges:
+            name, normal = "hole" if is_hole else _edge_name(edge, a, b), None
+            if not isinstance(edge, Arc):  # the material is on the left of an outline's edge
+                right, up = np.subtract(edge.end, edge.start) / math.dist(edge.end, edge.start)
+                normal = frame[:, :2] @ (up, -right)
+            near.append((_edge_distance(edge, a, b), Surface(name, normal)))
+        for end, side in ((extrusion.start, -1.0), (extrusion.end, 1.0)) if not is_hole else ():
+            name = "end face" if extrusion.axis == "Y" else "flat face"
+            near.append((abs(along - end), Surface(name, side * frame[:, 2])))
+    least = min(distance for distance, _ in near)
+    return tuple(surface for distance, surface in near if distance <= least + tolerance)
 
 
 def _edge_distance(edge: Edge, a: float, b: float) -> float:
@@ -91,12 +73,3 @@ def _edge_name(edge: Edge, a: float, b: float) -> str:
     if edge.sweep > 0.0:
         return "round face"
     return "lip" if min(math.dist((a, b), edge.start), math.dist((a, b), edge.end)) <= TOUCHING else "arc"
-
-
-def _edge_normal(extrusion: Extrusion, edge: Edge) -> Array | None:
-    """Out of the material, which is on the left of an outline's edge."""
-    if isinstance(edge, Arc):
-        return None
-    along = np.array([edge.end[0] - edge.start[0], edge.end[1] - edge.start[1]])
-    normal: Array = extrusion.frame[:, :2] @ np.array([along[1], -along[0]]) / np.linalg.norm(along)
-    return normal

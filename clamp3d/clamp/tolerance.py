@@ -73,15 +73,6 @@ class Spec:
 
 
 @dataclass(frozen=True, slots=True)
-class _Task:
-    """The samples from ``first`` to ``end`` - 1."""
-
-    spec: Spec
-    first: int
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
 class MonteCarlo:
     """Splint distances of n clamps within their tolerances.
 
@@ -196,7 +187,7 @@ def monte_carlo(
     chunks: dict[int, list[Sample]] = {}
     tell = progress or (lambda done, of: None)
     tell(0, n)
-    for k, chunk in _solve([_Task(spec, k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
+    for k, chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
         chunks[k] = chunk
         tell(sum(map(len, chunks.values())), n)
     samples = [sample for k in sorted(chunks) for sample in chunks[k]]
@@ -235,8 +226,8 @@ def _spec(
     return spec, *_closed(clamp)
 
 
-def _chunk(task: _Task) -> tuple[int, list[Sample]]:
-    return task.first, [_sample(task.spec, index) for index in range(task.first, task.end)]
+def _chunk(spec: Spec, indices: range) -> tuple[int, list[Sample]]:
+    return indices.start, [_sample(spec, index) for index in indices]
 
 
 def _sample(spec: Spec, index: int) -> Sample:
@@ -258,15 +249,13 @@ def _closed(clamp: Clamp) -> Sample:
     return (section.splint_distance(final.q) if status.clamped else None), status.text
 
 
-def _solve(tasks: list[_Task], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
+def _solve(spec: Spec, tasks: list[range], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
     """Chunks as they are finished, in any order."""
-    if not tasks:
-        return
     if scheduler is None and processes == 1:
-        yield from map(_chunk, tasks)
+        yield from (_chunk(spec, task) for task in tasks)
         return
     with _cluster(scheduler) if scheduler is not None else _processes(min(processes, len(tasks))) as (pool, workers):
-        futures = [pool.submit(_chunk, task) for task in tasks]
+        futures = [pool.submit(_chunk, spec, task) for task in tasks]
         waiting = set(futures)
         try:
             while waiting:

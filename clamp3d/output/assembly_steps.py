@@ -9,6 +9,7 @@ from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.section import Section
 from clamp3d.clamp.status import Seat, seats
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.section import edge_openings
@@ -72,7 +73,7 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     clamp, start, last = assembly.clamp, *_last_step(assembly)
     # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
     tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
-    rows = []
+    rows, section = [], Section(clamp, assembly.model)
     for waypoint in assembly.path:
         poses = waypoint.poses
         line, jumper = edge_openings(clamp, poses)
@@ -86,7 +87,7 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
                 turns=round((_screwed(poses) - _screwed(start)) / clamp.bolt.pitch, 9) + 0.0
                 if waypoint in last
                 else 0.0,
-                seats=seats(clamp, poses, assembly.model, tolerance),
+                seats=seats(section, section.state(poses), tolerance),
                 outside=tuple(w for w in _WIRES if not left < poses[w].x < left + clamp.up_splint.width),
             )
         )

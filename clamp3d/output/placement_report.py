@@ -12,7 +12,6 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.capture import Outcome
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.placement import Limits, Placement
-from clamp3d.clamp.places import section_poses
 from clamp3d.clamp.section import Section
 from clamp3d.output.figures import blank, title
 from clamp3d.output.section import draw_section
@@ -102,7 +101,7 @@ def capture_figure(placed: Placement) -> Figure:
 
     clamp, capture = placed.clamp, placed.capture
     section = Section(clamp, Cas())
-    poses = section_poses(section, open_start(section))
+    poses = section.poses(open_start(section))
     seat = poses.pop(placed.wire)
     figure = blank(8.0, 7.4)
     axes = figure.add_subplot()

@@ -65,14 +65,7 @@ class Outlines:
         clamp = self.clamp
         bolt = self.middle + q[6]
         saddle, x = bolt + q[7], bolt + q[7] + q[8]
-        # The back's centre is below the arc's by what leaves the nearest point of the arc, or a lip, at its radius.
-        half, lip = clamp.saddle.width / 2 - abs(q[8]), clamp.saddle.radius * math.cos(clamp.saddle.half_angle)
-        if abs(q[8]) <= self.clear * math.sin(clamp.saddle.half_angle):
-            below = math.sqrt(self.clear**2 - q[8] ** 2)
-        else:
-            below = lip - math.sqrt(clamp.down_splint.back_radius**2 - half**2)
-        y = q[4] - self.clear + below - q[9]
-        return np.array([*q[:4], x, y, q[5] / (clamp.down_splint.width / 2), bolt, saddle, q[4]])
+        return np.array([*q[:4], x, q[4] - q[9], q[5] / (clamp.down_splint.width / 2), bolt, saddle, q[4]])
 
     def gaps(self, z: Array, chosen: Sequence[tuple[Array, ...]]) -> Array:
         """All gaps: wires to the points ``chosen``, wires to the shank, faces, slot, saddle, joints."""

@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from outlines import Outlines
@@ -16,19 +15,14 @@ from clamp3d.bench.stress.assemblies.clamps import Case
 from clamp3d.bench.stress.assemblies.family import EXACT, Assemblies, Rest, Truths
 from clamp3d.clamp.dimensions import Clamp, Joints, Wire
 from clamp3d.clamp.equilibria import equilibria
-from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.section import WIRES, D, Section
+from clamp3d.clamp.section import D, Section
 from clamp3d.errors import SolverError
-from clamp3d.geometry.pose import Array
 
 OPTIMISER = 1e-5
 """Mm to which the optimiser on points agrees."""
-FORCES = 1e-4
-"""To this part of the bolt force a force agrees with the work that it does."""
 _PLAY = Joints(hole=True, saddle=True, washer=True)
-_WIDER = 1e-5
-"""By how much a wire's radius changes, in parts of it."""
 
 
 @dataclass
@@ -124,7 +118,6 @@ def check_clamps(
         clamp = whole_clamp(rng)
         for joints in (Joints(), _PLAY):
             optimised(score, k, replace(clamp, joints=joints))
-        forces(score, k, clamp)
         if k % 6 == 0:
             grid(score, k, whole_clamp(rng, major=0.0))
         listen(k, score)
@@ -142,37 +135,6 @@ def optimised(score: Score, k: int, clamp: Clamp) -> None:
     q = final.q
     least, overlap = Outlines(clamp).lowest(q)
     score.note(k, f"optimiser {play}", max(abs(least - float(q[D])), overlap), OPTIMISER)
-
-
-def forces(score: Score, k: int, clamp: Clamp) -> None:
-    """A thicker wire lifts the distance by the forces on it times what its radius grows: virtual work."""
-    final = solve_final_state(Section(clamp, Cas()))
-    for key, wire in zip(("line", "jumper"), WIRES, strict=True):
-        if wire in final.loose:
-            continue
-        r = getattr(clamp, key).radius
-        starts, sections = [], []
-        for more in (-_WIDER * r, _WIDER * r):
-            thicker: Any = {key: Wire(diameter=2.0 * (r + more))}
-            sections.append(Section(replace(clamp, **thicker), Cas()))
-            starts.append(_opened(sections[-1], final.q))
-        if starts[0] is None or starts[1] is None:
-            score.asked["forces not asked: the wire jams"] += 1
-            continue
-        ends = [solve_final_state(section, start).q[D] for section, start in zip(sections, starts, strict=True)]
-        pushed = sum(m for m, pair in zip(final.multipliers, final.gaps.pair, strict=True) if wire in pair)
-        score.note(k, "forces", abs((ends[1] - ends[0]) / (2.0 * _WIDER * r) - float(pushed)), FORCES)
-
-
-def _opened(section: Section, q: Array) -> Array | None:
-    """The state opened by at most 0.04 mm, and less where the wires would meet their grooves; None if they jam."""
-    for lift in 0.04 * 0.25 ** np.arange(8):
-        opened = q.copy()
-        opened[D] += lift
-        opened[[1, 3]] += 0.5 * lift
-        if section.gaps(opened).value.min() >= -TOLERANCE:  # the round back stays in the saddle's arc
-            return opened
-    return None
 
 
 def grid(score: Score, k: int, clamp: Clamp) -> None:

@@ -19,8 +19,7 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import close_on, placement
 from clamp3d.clamp.section import WIRES, Section
-from clamp3d.clamp.status import ClosingStatus
-from clamp3d.errors import InputError, NotClampedError, SolverError
+from clamp3d.errors import InputError, NotClampedError
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import rotation
 from clamp3d.output.placement_report import capture_figure
@@ -174,33 +173,9 @@ def test_a_range_is_caught_only_where_every_place_with_room_is():
     assert CaptureMap(np.arange(6.0), np.zeros(2), np.full((2, 6), o, dtype=np.int8)).captured is None
 
 
-def test_a_wire_on_a_lip_and_one_that_cannot_be_proven(monkeypatch):
-    section = Section(load_clamp(), Cas())
-    start = open_start(section)
-    overlapping = start.copy()
-    overlapping[1] -= 1.0
-    assert close_from(section, overlapping) == Outcome.NO_ROOM
-    status = ClosingStatus(True, "clamped, but P6 rests on the lip", ("P6 rests on the lip",), ())
-    monkeypatch.setattr("clamp3d.clamp.capture.closing_status", lambda *_: status)
-    assert close_from(section, start) == Outcome.ON_A_LIP
-
-    def unproven(*_):
-        raise SolverError("not proven")
-
-    monkeypatch.setattr("clamp3d.clamp.capture.solve_final_state", unproven)
-    assert close_from(section, start) == Outcome.NOT_PROVEN
-
-
 @pytest.fixture(scope="module")
 def final():
     return assemble()
-
-
-def test_a_straight_wire_closes_without_opening(final):
-    for wire in ("P6", "P7"):
-        opening, in_grooves = close_on(final, wire, np.zeros((1, 2)))
-        assert in_grooves.all()
-        assert abs(opening[0]) < 1e-6
 
 
 def test_a_pitched_wire_opens_by_its_lift_at_the_ends(final):

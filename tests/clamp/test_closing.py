@@ -19,12 +19,11 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import EDGES, SIZE, B, D, Gaps, S, Section, U
 
 
-def test_an_optimiser_a_grid_and_virtual_work_agree() -> None:
+def test_an_optimiser_and_a_grid_agree() -> None:
     """Four of the clamps that ``scripts/check-clamps`` takes hundreds of."""
     score = check_clamps(4, 1)
     assert score.findings == []
     assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 4
-    assert score.asked["forces"] > 0
     assert score.asked["equilibria named"] == 1
 
 
@@ -43,21 +42,6 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
     if not joints.saddle:
         assert list(on_saddle) == [EDGES]
         assert final.q[U] > 3.0
-
-
-def test_the_end_does_not_depend_on_the_length_of_a_step() -> None:
-    rng = np.random.default_rng(15)
-    for _ in range(6):
-        section = Section(whole_clamp(rng), Cas())
-        ends = [solve_final_state(section, stride=stride).q[D] for stride in (0.01, 0.004)]
-        assert ends[0] == pytest.approx(ends[1], abs=1e-7)
-
-
-def test_a_saddle_with_play_on_the_bolt_comes_to_rest() -> None:
-    """Taken as following the splint it had a kink at the end of its play, on both sides of which steps took turns."""
-    clamp = replace(whole_clamp(np.random.default_rng([0, 20])), joints=Joints(hole=True, saddle=True, washer=True))
-    final = solve_final_state(Section(clamp, Cas()))
-    assert Outlines(clamp).lowest(final.q)[0] == pytest.approx(float(final.q[D]), abs=1e-5)
 
 
 def test_gradients_agree_with_differences_where_joints_have_play_and_wires_leave_the_faces() -> None:
@@ -145,7 +129,6 @@ def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove() -> None:
 def test_the_tilt_stops_where_the_bodies_meet(tilt_deg: float) -> None:
     """At the derived stop the exact bodies touch; a little less and they are apart, a little more and they overlap."""
     from clamp3d.clamp.contact import measure_contacts
-    from clamp3d.clamp.steps import section_poses
 
     clamp = load_clamp()
     section = Section(clamp, Cas())
@@ -153,7 +136,7 @@ def test_the_tilt_stops_where_the_bodies_meet(tilt_deg: float) -> None:
     def gap(tilt: float) -> float:
         q = np.zeros(SIZE)
         q[D], q[S] = 60.0, section.lever * tilt
-        (c,) = measure_contacts(clamp, section_poses(section, q, saddle_d=60.0), pairs=[("P2", "P3")])
+        (c,) = measure_contacts(clamp, section.poses(q, saddle_d=60.0), pairs=[("P2", "P3")])
         return c.gap
 
     assert gap(math.radians(tilt_deg)) >= -1e-9

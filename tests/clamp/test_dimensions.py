@@ -113,15 +113,3 @@ def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
     made(40.0, 60.0 - 23.8012 + 1e-6)
     with pytest.raises(InputError, match="does not reach its face"):
         made(40.0, 60.0 - 23.8012 - 1e-6)
-
-
-def test_a_groove_must_not_cut_the_top_face():
-    up = load_clamp().up_splint
-
-    def made(depth):
-        groove = replace(up.line_groove, centre_depth=depth, offset=40.0)
-        replace(up, thickness=30.0, line_groove=groove, jumper_groove=groove)
-
-    made(23.8012 + 1e-6)
-    with pytest.raises(InputError, match="the arc cuts the top face"):
-        made(23.8012 - 1e-6)

@@ -14,7 +14,6 @@ from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
-from clamp3d.clamp.landscape import downhill
 from clamp3d.clamp.section import Section
 from clamp3d.cli import group
 from clamp3d.output.run_report import run_to_text
@@ -97,17 +96,3 @@ def test_command_line_tells_them_unless_told_not_to(tmp_path):
     refused = CliRunner().invoke(group, ["run", "--quiet", "--solver", "stepped", "--equilibria"])
     assert refused.exit_code == 2
     assert "--equilibria goes with --solver exact, not stepped" in refused.output
-
-
-def test_samples_slide_to_the_lower_side_and_level_ones_to_their_first():
-    """Against the words: the next other height on either side, the lower one first, level stretches as one."""
-    rows = np.random.default_rng(0).integers(0, 4, size=(200, 12)).astype(float)
-    step = downhill(rows)
-    for row, steps in zip(rows, step, strict=True):
-        for i, here in enumerate(row):
-            right = next((v for v in row[i + 1 :] if v != here), np.inf)
-            left = next((v for v in row[:i][::-1] if v != here), np.inf)
-            if min(left, right) < here:
-                assert steps[i] == (1 if right <= left else -1)
-            else:
-                assert steps[i] == (-1 if i and row[i - 1] == here else 0)

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.clamp.assemble import STEP, TILT_STEP, assemble
 from clamp3d.clamp.conductors import catalogue
+from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import SIZE, D, Section
@@ -55,7 +57,9 @@ def test_any_open_start_ends_in_the_same_state(clamp):
     for _ in range(20):
         start = section.open_state(section.open_distance() + rng.uniform(0.0, 60.0), rng.uniform(-limit, limit))
         start[:4] += rng.uniform(-5.0, 5.0, 4)
-        assert section.gaps(start).value[:-1].min() > 0.0  # the saddle's arc, the last, carries
+        gaps = section.gaps(start)
+        apart = [v for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair != ("P2", "P3")]
+        assert min(apart) > 0.0
         assert solve_final_state(section, start).q == pytest.approx(known, abs=1e-9)
 
 
@@ -123,15 +127,18 @@ def test_gradients_agree_with_differences(clamp):
 
 
 def test_curvatures_agree_with_differences_of_gradients(clamp):
-    rng, section, h = np.random.default_rng(5), Section(clamp, Cas()), 1e-5
-    for pair in itertools.product(("P1", "P2"), ("P6", "P7")):
-        q = section.open_state(33.0, 0.03) + np.append(0.3 * rng.normal(size=6), 0.01 * rng.normal(size=4))
-        own = [p == pair for p in section.gaps(q).pair]
-        force = rng.uniform(0.0, 1.0, sum(own))
-        sides = [[force @ section.gaps(q + s * h * e).gradient[own] for e in np.eye(SIZE)] for s in (1.0, -1.0)]
-        numeric = np.subtract(*sides) / (2.0 * h)
-        assert np.abs(numeric).max() > 0.01
-        assert np.allclose(section.wire_curvature(q, *pair, force, h), numeric, atol=1e-8)
+    """Of every gap alone: wires in arcs and on lips, beside the splints' edges, faces, slot, saddle."""
+    rng, h, seen = np.random.default_rng(5), 1e-5, set()
+    section = Section(replace(clamp, joints=Joints(hole=True, saddle=True, washer=True)), Cas())
+    for d, aside in itertools.product((33.0, 60.0), (0.0, 14.0, 30.0)):
+        q = section.open_state(d, 0.03) + np.append(0.3 * rng.normal(size=6), 0.01 * rng.normal(size=4))
+        q[[0, 2]] += -aside, aside
+        sides = [[section.gaps(q + s * h * e).gradient for e in np.eye(SIZE)] for s in (1.0, -1.0)]
+        numeric, gaps = np.subtract(*sides) / (2.0 * h), section.gaps(q)
+        for k, force in enumerate(np.eye(len(gaps.value))):
+            assert np.allclose(section.hessian(q, gaps, force), numeric[:, k], atol=1e-7), gaps.feature[k]
+            seen |= {(gaps.pair[k], gaps.feature[k].split()[0])}
+    assert {(("P1", "P6"), "arc"), (("P2", "P7"), "lip"), (("P2", "P3"), "arc"), (("P2", "P4"), "slot")} <= seen
 
 
 @pytest.mark.parametrize("splint", ["P1", "P2"])

@@ -15,8 +15,7 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
-from clamp3d.clamp.steps import section_poses
-from clamp3d.clamp.ways import DIRECTIONS, Ways, way_out
+from clamp3d.clamp.ways import Ways
 from clamp3d.errors import SequenceError
 from clamp3d.geometry.meshing import mesh
 from clamp3d.output.report import make_report
@@ -55,12 +54,6 @@ def at_once():
     return assemble(replace(load_clamp(), sequence="P1|P2P3P4P5 -> P7 -> P5|P2P3P4"))
 
 
-def open_place():
-    """World poses in the open clamp on the line."""
-    run = reference()
-    return {name: run.path[4].T_world(name) for name in PARTS}
-
-
 def at(T, offset):
     moved = T.copy()
     moved[:3, 3] += offset
@@ -81,12 +74,6 @@ def overlaps_on(path, steps=4):
                 if (a, b) != SCREW:
                     worst = max(worst, volume(a, T[a], b, T[b]))
     return worst
-
-
-def positions(way, steps=5):
-    """Offsets (3,) on a way out, which begins at the place."""
-    corners = [np.zeros(3), *way]
-    return [a + t * (b - a) for a, b in itertools.pairwise(corners) for t in np.linspace(0.0, 1.0, steps)]
 
 
 @pytest.mark.parametrize(
@@ -114,44 +101,6 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
 
 def test_the_papers_own_motions_overlap_nowhere():
     assert overlaps_on(reference().path) < TOUCHING
-
-
-def assert_as_volumes_say(part, others):
-    """A way in that is free or blocked: the same answer as from the facets' volumes, at the same instant."""
-    place, ways = open_place(), Ways(load_clamp())
-    pairs = [(part, other) for other in others]
-    legs = ways.find(pairs, place)
-    for offset in positions(way_out(legs)) if legs else ():
-        for _, b in pairs:
-            if {part, b} != set(SCREW):
-                assert volume(part, at(place[part], offset), b, place[b]) < TOUCHING, (legs, offset, b)
-    blocks = () if legs else ways.blocks(pairs, place)
-    assert legs or blocks
-    assert blocks == tuple(sorted(blocks, key=lambda block: block.way - block.travel))
-    for block in blocks:
-        u = np.array(DIRECTIONS[block.origin])
-
-        def shared(travel, other, u=u, block=block):
-            return volume(part, at(place[part], (block.way - travel) * u), other, place[other])
-
-        assert shared(block.travel + 0.2, block.b) > 1e-6, str(block)
-        for travel in np.linspace(0.0, block.travel - 0.2, 12):
-            for other in others:
-                assert {part, other} == set(SCREW) or shared(travel, other) < 1e-6, (str(block), travel, other)
-    return legs
-
-
-@pytest.mark.parametrize(
-    ("part", "others", "free"),
-    [  # all that permutations of the parts lead to
-        ("P7", ("P1", "P3", "P4", "P6"), True),
-        ("P4", ("P1", "P3", "P5", "P6"), True),
-        ("P3", ("P1", "P5", "P7"), True),
-        ("P1", ("P5", "P7", "P6"), True),  # comes to the wires beside the nut, and slides along them under it
-    ],
-)
-def test_a_way_is_free_or_blocked_as_volumes_say(part, others, free):
-    assert bool(assert_as_volumes_say(part, others)) == free
 
 
 @pytest.mark.parametrize(
@@ -182,7 +131,7 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
 def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_from_above():
     """The last 1e-4 mm of a way onto a slope are proven by where it ends."""
     section = Section(whole_clamp(np.random.default_rng([0, 9])), Cas())
-    place = {name: pose.T() for name, pose in section_poses(section, open_start(section)).items()}
+    place = {name: pose.T() for name, pose in section.poses(open_start(section)).items()}
     groove = section.pairs["P1", "P6"]
     assert abs(place["P1"][0, 3] + groove.T_a_groove[0, 3]) > 0.1  # not above the line
     ((origin, _),) = Ways(section.clamp).find([("P1", "P6")], place)

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad, quad
 
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.errors import InputError
@@ -67,31 +66,6 @@ def test_down_splint_volume_is_its_height_integrated() -> None:
     assert REFERENCE["P2"].volume == pytest.approx(expected, rel=1e-11)
 
 
-def test_slot_wider_than_the_round_back_reaches_the_flat_underside() -> None:
-    # A saddle narrow enough for so short a back.
-    saddle = replace(CLAMP.saddle, width=23.0)
-    down = replace(CLAMP.down_splint, back_half_angle_deg=27.0, slot_width=46.0)
-    slotted = parts(replace(CLAMP, down_splint=down, saddle=saddle))["P2"]
-    assert slotted.bodies[0].volume - slotted.volume == pytest.approx(
-        22.0
-        * _integral(
-            lambda x: (
-                (math.sqrt(48.0**2 - x * x) if abs(x) < _back(27.0) else 48.0 * math.cos(math.radians(27.0))) - 24.5505
-            ),
-            -23,
-            23,
-            [-_back(27.0), _back(27.0)],
-        ),
-        rel=1e-11,
-    )
-    low, high = volume_bounds(slotted, 0.05)
-    assert low <= mesh(slotted, 0.05).volume <= high
-
-
-def _back(half_angle_deg: float) -> float:
-    return 48.0 * math.sin(math.radians(half_angle_deg))
-
-
 def test_saddle_volume_is_its_height_integrated_outside_the_hole() -> None:
     bottom = 49.230 + 12.19
 
@@ -127,20 +101,6 @@ def test_bounds_are_the_published_sizes() -> None:
     }
     for name, box in expected.items():
         np.testing.assert_allclose(REFERENCE[name].bounds, box, atol=1e-12)
-
-
-def test_outlines_carry_the_arcs_of_the_contact_features() -> None:
-    """Bodies and contact features are two descriptions of one part: same centre, radius, angle, length and mouth."""
-    for (a, _), pair in groove_pairs(CLAMP).items():
-        x, _, z = pair.T_a_groove[:3, 3]
-        arcs = [arc for arc in REFERENCE[a].bodies[0].profile.arcs if arc.sweep < 0]
-        arc = min(arcs, key=lambda arc: math.dist(arc.centre, (x, -z)))
-        assert arc.centre == pytest.approx((x, -z), abs=1e-12)
-        assert arc.radius == pair.groove.radius
-        assert -arc.sweep / 2 == pytest.approx(pair.groove.half_angle, abs=1e-15)
-        assert REFERENCE[a].bodies[0].length == pair.groove.length
-        middle = np.subtract(arc.at(arc.start_angle + arc.sweep / 2), arc.centre) / arc.radius
-        np.testing.assert_allclose([middle[0], -middle[1]], -pair.T_a_groove[[0, 2], 1], atol=1e-12)
 
 
 @pytest.mark.parametrize("mesh_error", [5.0, 0.5, 0.01, 1e-4])

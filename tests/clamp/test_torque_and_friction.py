@@ -13,9 +13,8 @@ from scipy.optimize import brentq, linprog
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp import loader
-from clamp3d.clamp.closing import HELD
 from clamp3d.clamp.dimensions import Limits
-from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand, unit_work
+from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.torque import tighten, torque_per_newton
 from clamp3d.cli import group
@@ -133,23 +132,19 @@ def test_work_of_forces_is_that_of_the_gaps():
     """Along the normal it must be the gap's derivative; along the tangent, what the touching material moves."""
     section, q = Section(REFERENCE, Cas()), np.zeros(SIZE)
     q[:6] = FrictionBand(REFERENCE).final.q[:6] + np.array((0.3, -0.2, 0.1, 0.4, 0.5, -0.7))
-    gaps, angle = section.gaps(q), q[S] / section.lever
+    gaps, pose = section.gaps(q), section.down_splint(q)
+    tangents = gaps.normal @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    along = section.work(q, gaps.pair, gaps.point, tangents)
+    assert section.work(q, gaps.pair, gaps.point, gaps.normal)[:, SIZE:] == pytest.approx(0.0, abs=1e-9)  # round wires
     for k in [k for k, (a, b) in enumerate(gaps.pair) if b in ("P6", "P7") and a != "P4"]:
-        work = unit_work(section, q, gaps, k, gaps.normal[k])
-        assert work[:7] == pytest.approx(gaps.gradient[k][list(HELD)], abs=1e-9)
-        assert work[7:] == pytest.approx(0.0, abs=1e-9)  # of a round wire
-        i, tangent = ("P6", "P7").index(gaps.pair[k][1]), np.array([-gaps.normal[k, 1], gaps.normal[k, 0]])
-        work = unit_work(section, q, gaps, k, tangent)
-        radius = section.pairs[gaps.pair[k]].cylinder.radius  # the force acts on the splint's surface
-        assert abs(work[7 + i]) == pytest.approx(1.0 + gaps.value[k] / radius, abs=1e-6)
+        i, radius = ("P6", "P7").index(gaps.pair[k][1]), section.pairs[gaps.pair[k]].cylinder.radius
+        assert abs(along[k, SIZE + i]) == pytest.approx(1.0 + gaps.value[k] / radius, abs=1e-6)
         if gaps.pair[k][0] == "P2":
-            pose, h = section.down_splint(q), 1e-6
-            c, s = math.cos(angle), math.sin(angle)
+            c, s, h = math.cos(pose.angle), math.sin(pose.angle), 1e-6
             x, y = gaps.point[k] - (pose.x, pose.y)
-            on_splint = x * c - y * s, x * s + y * c
-            moved = replace(pose, angle=angle + h).point(*on_splint)
-            assert work[5] == pytest.approx(-tangent @ (moved - gaps.point[k]) / h / section.lever, abs=1e-5)
-            assert work[4] == pytest.approx(-tangent[1])
+            moved = replace(pose, angle=pose.angle + h).point(x * c - y * s, x * s + y * c)
+            assert along[k, S] == pytest.approx(-tangents[k] @ (moved - gaps.point[k]) / h / section.lever, abs=1e-5)
+            assert along[k, D] == pytest.approx(-tangents[k, 1])
 
 
 def has_equilibrium(q, section, friction, touching):
