@@ -158,6 +158,8 @@ class Ways:
         """Directions that lead out, each with how far until the moving parts, ``start`` off their place, are past all
         boxes on their way; without ``wires`` past those of all other parts, on their way or not."""
         moving = [_box(self.solids[a], place[a]) for a in {a for a, _ in pairs}]
+        if not moving:  # nothing stands in the way
+            return [(origin, 0.0) for origin in DIRECTIONS]
         low, high = (pick([box[i] for box in moving], axis=0) + start for i, pick in enumerate((np.min, np.max)))
         exits = []
         for origin in DIRECTIONS:
