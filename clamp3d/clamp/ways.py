@@ -20,6 +20,7 @@ from clamp3d.clamp.section import WIRES
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
+from clamp3d.engine.result import NOT_CLEAN, PairResult
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array
@@ -40,10 +41,15 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
 """Where a part can come from, as unit vectors of the world: along the bolt, across the wires, along them."""
 _ENDLESS = 20.0
 """How many times as long as drawn a wire is taken to be."""
-_BENDS = (0.5, 0.25, 0.125, 0.75)
-"""Where a way out bends, in parts of how far it leads."""
+_BENDS = (0.5, 0.25, 0.75)
+"""Where a way out bends, in parts of how far the parts can go before they meet something."""
 _LOOKS = (0.5, 0.25, 0.125, 0.0625, 0.03125)
 """Where a way is looked at before it is proven: most ways that are blocked show it."""
+_SHORTEST = 0.5
+"""Shortest leg of a way with a bend, mm."""
+_LOOK = 0.01
+"""So far behind the first contact, in mm, parts are looked at first."""
+
 Leg = tuple[str, float]
 """Where the parts come from (`DIRECTIONS`), and how far, mm; a way out is its legs from the place."""
 Poses = Mapping[PartName, Array]
@@ -105,9 +111,10 @@ class Ways:
         self._farthest = 0.5 * length - clamp.wire_length
 
     def find(self, pairs: Sequence[Pair], place: Poses) -> tuple[Leg, ...]:
-        """The first free way out, straight or with one bend; empty if nothing is free, and `blocks` says why."""
-        todo, here = list(pairs), np.zeros(3)  # what blocked one way is looked at first on the next
-        for origin, length in self._exits(pairs, place, here):
+        """The first free way out; empty if nothing is free, and `blocks` says why."""
+        todo, here = list(pairs), np.zeros(3)  # what blocked one way is asked first about the next
+        exits = list(self._exits(pairs, place, here))
+        for origin, length in exits:
             if self._is_free(todo, place, here, out(origin, length)):
                 return ((origin, length + SPARE),)
         for origin in DIRECTIONS:
@@ -126,75 +133,114 @@ class Ways:
         return tuple(sorted(filter(None, met), key=lambda block: block.way - block.travel))
 
     def block(self, pairs: Sequence[Pair], place: Poses, origin: str, length: float) -> Block | None:
-        """What overlaps first on the straight way of ``length`` mm to ``place``; None if it is free."""
-        todo, start = list(pairs), out(origin, length)
-        first = self._blocker(todo, place, start, -start)
-        if first is None:
+        """What meets first on the straight way of ``length`` mm to ``place``; None if it is free."""
+        start = out(origin, length)
+        share, pair = self._first(pairs, place, start, -start)
+        if pair is None:
             return None
-        free, blocked = 0.0, 1.0  # shares of the way
-        while (blocked - free) * length > RESOLUTION:
-            share = 0.5 * (free + blocked)
-            blocker = self._blocker(todo, place, start, -share * start)
-            if blocker is None:
-                free = share
-            else:
-                blocked, first = share, blocker
-        met = self._scene([first], place, (1.0 - free) * start)
-        (row,) = check(met, pairs=[first], distances=True, depths=False, cache=self.cache).pairs
-        point = row.distance.point_b if row.a == first[0] else row.distance.point_a
-        return Block(origin, *first, point, free * length, length)
+        met = self._scene([pair], place, (1.0 - share) * start)
+        row = next(iter(check(met, pairs=[pair], distances=True, depths=False, cache=self.cache).pairs))
+        point = row.distance.point_b if row.a == pair[0] else row.distance.point_a
+        return Block(origin, *pair, point, share * length, length)
 
     def scene(self, pairs: Sequence[Pair], place: Poses, block: Block) -> Scene:
         """The parts of ``pairs`` as drawn, with the motion that ``block`` blocks, up to the place."""
         start = out(block.origin, block.way)
-        scene = self._scene(pairs, place, start, -start, solids=self.drawn, name=f"{block.a} {block.origin}")
-        return replace(scene, name=f"{self.clamp.name} clamp: the step that is blocked")
+        return replace(
+            self._scene(pairs, place, start, -start, solids=self.drawn, name=f"{block.a} {block.origin}"),
+            name=f"{self.clamp.name} clamp: the step that is blocked",
+        )
 
     def box(self, part: PartName, place: Poses) -> Box:
         """Corners of the box around a part as it is drawn."""
         return _box(self.drawn[part], place[part])
 
-    def _exits(self, pairs: Sequence[Pair], place: Poses, start: Array, *, wires: bool = True) -> list[Leg]:
-        """Directions that lead out, each with how far until the moving parts, ``start`` off their place, are past all
-        boxes on their way; without ``wires`` past those of all other parts, on their way or not."""
-        moving = [_box(self.solids[a], place[a]) for a in {a for a, _ in pairs}]
-        if not moving:  # nothing stands in the way
-            return [(origin, 0.0) for origin in DIRECTIONS]
-        low, high = (pick([box[i] for box in moving], axis=0) + start for i, pick in enumerate((np.min, np.max)))
-        exits = []
+    def _exits(self, pairs: Sequence[Pair], place: Poses, start: Array) -> Iterator[Leg]:
+        """Directions that lead out, each with how far until the moving parts' common box leaves that of the others."""
         for origin in DIRECTIONS:
-            u, length = out(origin), 0.0
-            k = int(np.argmax(np.abs(u)))
-            across = [i for i in range(3) if i != k]
-            for name in {b for _, b in pairs if wires or b not in WIRES}:
-                still_low, still_high = _box(self.solids[name], place[name])
-                if not wires or all(low[i] < still_high[i] and high[i] > still_low[i] for i in across):
-                    length = max(length, float(still_high[k] - low[k] if u[k] > 0.0 else high[k] - still_low[k]))
+            length = self._length(pairs, place, start, origin)
             if length <= self._farthest:
-                exits.append((origin, length))
-        return exits
+                yield origin, length
+
+    def _length(self, pairs: Sequence[Pair], place: Poses, start: Array, origin: str, *, beside: bool = False) -> float:
+        """How far the moving parts, ``start`` off their place, go until their common box is past all others.
+
+        Boxes that they pass beside do not count, unless ``beside``.
+        """
+        u = out(origin)
+        k = int(np.argmax(np.abs(u)))
+        across, length = [i for i in range(3) if i != k], 0.0
+        moving = [_box(self.solids[a], place[a]) for a in {a for a, _ in pairs}]
+        for name in {b for _, b in pairs}:
+            low, high = (pick([box[i] for box in moving], axis=0) + start for i, pick in enumerate((np.min, np.max)))
+            still_low, still_high = _box(self.solids[name], place[name])
+            if beside or all(low[i] < still_high[i] and high[i] > still_low[i] for i in across):
+                length = max(length, float(still_high[k] - low[k] if u[k] > 0.0 else high[k] - still_low[k]))
+        return length
 
     def _bends(self, pairs: list[Pair], place: Poses, origin: str) -> Iterator[float]:
-        """How far a first leg may go: past all that is no wire, along the wires; else a part of the way out."""
-        here, along = np.zeros(3), bool(DIRECTIONS[origin][1])
-        length = dict(self._exits(pairs, place, here, wires=not along)).get(origin, self._farthest)
-        for leg in (length + SPARE,) if along else (part * length for part in _BENDS):
-            if 0.0 < leg <= self._farthest and self._is_free(pairs, place, here, out(origin, leg)):
-                yield leg
+        """How far a first leg may go: past all that is no wire, along the wires; else a part of the free way."""
+        here, standing = np.zeros(3), [pair for pair in pairs if pair[1] not in WIRES]
+        if DIRECTIONS[origin][1]:
+            length = self._length(standing, place, here, origin, beside=True) + SPARE
+            if length <= self._farthest and self._is_free(pairs, place, here, out(origin, length)):
+                yield length
+            return
+        reach = min(self._length(pairs, place, here, origin), self._farthest)
+        if reach <= 0.0 or not self._is_free(pairs, place, here, out(origin, min(reach, _SHORTEST / _BENDS[1]))):
+            return
+        free = reach * self._first(pairs, place, here, out(origin, reach))[0]
+        yield from (part * free for part in _BENDS)
 
     def _is_free(self, pairs: list[Pair], place: Poses, start: Array, by: Array) -> bool:
-        return self._blocker(pairs, place, start, by) is None
-
-    def _blocker(self, pairs: list[Pair], place: Poses, start: Array, by: Array) -> Pair | None:
-        """A pair that overlaps on a way ``by`` (3,), or may do so; it is put first."""
+        """Whether nothing overlaps on a way; what does is put first."""
         for pair in pairs:
-            stops = [self._scene([pair], place, start + t * by) for t in _LOOKS]
-            for scene in (*stops, self._scene([pair], place, start, by)):
-                if not check(scene, pairs=[pair], depths=False, cache=self.cache).clean:
-                    pairs.remove(pair)
-                    pairs.insert(0, pair)
-                    return pair
-        return None
+            if self._clash(pair, place, start, by) is not None:
+                pairs.remove(pair)
+                pairs.insert(0, pair)
+                return False
+        return True
+
+    def _first(self, pairs: Sequence[Pair], place: Poses, start: Array, by: Array) -> tuple[float, Pair | None]:
+        """Up to which part of their way ``by`` (3,) the moving parts, ``start`` off their place, overlap nothing."""
+        share, first = 1.0, None
+        for pair in pairs:
+            row = self._clash(pair, place, start, share * by)
+            while row is not None:
+                earlier = share * self._onset(pair, place, start, share * by, row)
+                is_new = share - earlier > RESOLUTION / float(np.abs(by).max())
+                share, first = earlier, pair
+                row = self._clash(pair, place, start, share * by) if is_new else None
+        return share, first
+
+    def _onset(self, pair: Pair, place: Poses, start: Array, by: Array, row: PairResult) -> float:
+        """Where on its way ``by`` (3,) a pair begins an overlap, as a share of it: there may be an earlier one."""
+        length = float(np.abs(by).max())
+        # Before they touch they are apart, and at the time of their least distance they overlap.
+        low, high = row.contact_at or 0.0, 1.0 if row.t is None else row.t
+        middle = low + _LOOK / length
+        while (high - low) * length > RESOLUTION:
+            middle = middle if low < middle < high else 0.5 * (low + high)
+            if self._overlap(pair, place, start + middle * by) is None:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _overlap(self, pair: Pair, place: Poses, offset: Array) -> PairResult | None:
+        """The row of a pair that overlaps with the moving part ``offset`` (3,) off its place."""
+        there = check(self._scene([pair], place, offset), pairs=[pair], depths=False, cache=self.cache)
+        return None if there.clean else there.rows[0]
+
+    def _clash(self, pair: Pair, place: Poses, start: Array, by: Array) -> PairResult | None:
+        """The row of a pair that overlaps on its way, or may do so."""
+        for t in _LOOKS:
+            row = self._overlap(pair, place, start + t * by)
+            if row is not None:
+                return replace(row, t=t)
+        scene = self._scene([pair], place, start, by)
+        rows = check(scene, pairs=[pair], depths=False, cache=self.cache).rows
+        return next((row for row in rows if row.verdict in NOT_CLEAN), None)
 
     def _scene(
         self,
