@@ -144,11 +144,13 @@ def _with_witnesses(
     are tried too. ``T`` (4, 4) places b in a's frame, where the points are.
     """
     distance = replace(raw, upper=math.inf, point_a=None, point_b=None)
+    expensive = a.surface is not None or b.surface is not None
+    if expensive and raw.lower < -0.01:  # the meshes attest a depth for less
+        return distance
     if raw.point_a is not None and raw.point_b is not None:
         attest = _on_both if raw.upper >= 0.0 else _in_both
         distance = attest(raw, a, b, T, raw.point_a[None], raw.point_b[None])
-    expensive = a.surface is not None or b.surface is not None
-    if distance.upper - raw.lower <= 1e-10 or raw.normal is None or (expensive and raw.lower < -0.01):
+    if distance.upper - raw.lower <= 1e-10 or raw.normal is None:
         return distance
     attest = _on_both if raw.lower >= 0.0 else _in_both
     return distance.meet(attest(raw, a, b, T, *_facing(raw.normal, raw.lower, pieces, T)))

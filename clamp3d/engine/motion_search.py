@@ -21,6 +21,8 @@ ACCURACY = 1e-6
 """Default accuracy of a search, mm."""
 MOST = 20_000
 """Default number of times at which a search asks for the distance."""
+SHARPENING = 0.04
+"""Share of that number after which bounds that are sharp enough end a search."""
 
 
 class Least(NamedTuple):
@@ -95,7 +97,7 @@ def least(
     most : int
         How often ``distance`` is asked; the bounds are further apart where that is not enough.
     is_enough : callable, optional
-        Whether bounds (mm) of the answer are sharp enough, so that a tenth of ``most`` ends the search.
+        Whether bounds (mm) of the answer are sharp enough, so that a share of ``most`` (`SHARPENING`) ends the search.
 
     Examples
     --------
@@ -109,7 +111,7 @@ def least(
     heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
     while heap and heap[0].lower < upper - accuracy and evaluations < most:
-        if 10 * evaluations >= most and is_enough(min(heap[0].lower, lower), upper):
+        if evaluations >= SHARPENING * most and is_enough(min(heap[0].lower, lower), upper):
             break
         stretch = heapq.heappop(heap)
         middle = _meeting(stretch, speed)
