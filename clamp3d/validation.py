@@ -139,4 +139,5 @@ def _unknown(where: str, name: str, known: typing.Sequence[str]) -> str:
     import difflib
 
     near = difflib.get_close_matches(name, known, n=1)
-    return f"{checks.short(where, 100)} is not a known key" + (f"; did you mean {near[0]}?" if near else "")
+    hint = f"did you mean {near[0]}?" if near else f"choices: {', '.join(known)}"
+    return f"{checks.short(where, 100)} is not a known key; {hint}"
