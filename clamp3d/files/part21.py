@@ -10,6 +10,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from clamp3d.errors import InputError
+
 _NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
 _RECORD = re.compile(r"#\s*0*(\d+)\s*=\s*([^;]+)")
 _TYPES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
@@ -37,12 +39,16 @@ class Announced:
 
 
 def announced(path: Path) -> Announced:
-    """What the file announces."""
+    """What the file announces. Raises InputError for entities of one number, with which Open CASCADE may not end."""
     raw = path.read_bytes().decode("latin-1")
     text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", raw)
+    records = _RECORD.findall(text)
+    (number, count), *_ = [*Counter(number for number, _ in records).most_common(1), ("", 0)]
+    if count > 1:
+        raise InputError(f"the STEP file is damaged: #{number} is defined {count} times")
     types = {
         number: _TYPES.findall(content) if content[0] == "(" else [content.partition("(")[0].rstrip()]
-        for number, content in _RECORD.findall(text)
+        for number, content in records
     }
     unused = types.keys() - set(_REFERENCE.findall(text))
     return Announced(

@@ -28,7 +28,7 @@ _OTHERS = re.compile(
     "CSG_SOLID|(EXTRUDED|REVOLVED)_AREA_SOLID|SWEPT_FACE_SOLID|SOLID_REPLICA|TESSELLATED_(SOLID|SHELL)"
 )
 """Bodies that Open CASCADE does not make into solids."""
-_FAULT = re.compile("Parsing|Unresolved|SEVERAL TIMES")
+_FAULT = re.compile("Parsing|Unresolved")
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 

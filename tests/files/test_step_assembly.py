@@ -138,7 +138,7 @@ def test_a_name_that_is_not_utf8_is_read(tmp_path):
         ("DIRECTION('',", "DIRECTION(('',", "damaged: .*Incorrect syntax"),
         ("DIRECTION('',", "DIRECTION(#999999,", "damaged: Unresolved Reference"),
         ("DIRECTION('',", "DIRECTION 7 = ('',", "damaged: .*Incorrect syntax"),
-        ("\n#12 ", "\n#11 ", "damaged: Ident defined SEVERAL TIMES : #11"),
+        ("\n#12 ", "\n#11 ", "damaged: #11 is defined 2 times"),
         ("\nENDSEC;\nEND-", "\nEND-", "not a readable STEP file, or it is cut off"),
         ("\nHEADER;", "\n", "not a readable STEP file, or it is cut off"),
         ("ADVANCED_FACE('',(#71),", "ADVANCED_FACE('',(),", r"missing: FACE_BOUND \(#71\) that belongs to nothing"),
