@@ -25,6 +25,8 @@ _TOUCHING = 1e-3
 _ENLARGED = 2.0**27
 """FCL measures pieces this much larger: its solver stops at an absolute 1e-6, and a power of two costs no rounding.
 Of random boxes and cylinders the bounds are then 1e-13 mm apart, in place of up to 4e-4."""
+_LOOSE = 1e-9
+"""Width (mm) of bounds at which FCL is asked in the other order too, in which its solver may end nearer."""
 _EPS = 2.0**-52
 
 
@@ -102,21 +104,29 @@ def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, sharp: bool =
 
     Not ``sharp``: pieces that all but touch are not searched for the direction that proves it.
     """
-    import fcl
-
     pair = _enlarged(a, Ta), _enlarged(b, Tb)
-    answer = fcl.DistanceResult()
-    fcl.distance(*pair, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=_libccd()), answer)
-    p, q = (np.asarray(x, dtype=np.float64) / _ENLARGED for x in answer.nearest_points)
-    if answer.min_distance > 0.0 and 0.0 < norm(q - p) < np.inf:
-        distance = _apart(a, Ta, b, Tb, p, q)
-    else:
+    points = _nearest(*pair)
+    if points is None:
         distance = _overlapping(a, Ta, b, Tb, pair)
+    else:
+        distance = _apart(a, Ta, b, Tb, *points)
+        if distance.upper - distance.lower > _LOOSE and (points := _nearest(*pair[::-1])) is not None:
+            distance = distance.meet(_apart(a, Ta, b, Tb, *points[::-1]))
     if sharp and distance.upper - distance.lower > 1e-9 and abs(distance.upper) < _TOUCHING:
         from clamp3d.engine.convex_depth import convex_depth  # which needs the pieces of this module
 
         distance = distance.meet(Distance(convex_depth(a, Ta, b, Tb).lower))
     return replace(distance, unique=_unique(a, Ta, b, Tb, distance))
+
+
+def _nearest(a: Any, b: Any) -> tuple[Array, Array] | None:
+    """FCL's nearest points (3,) of two objects; None where they touch or overlap."""
+    import fcl
+
+    answer = fcl.DistanceResult()
+    fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True, gjk_solver_type=_libccd()), answer)
+    p, q = (np.asarray(x, dtype=np.float64) / _ENLARGED for x in answer.nearest_points)
+    return (p, q) if answer.min_distance > 0.0 and 0.0 < norm(q - p) < np.inf else None
 
 
 def _libccd() -> Any:

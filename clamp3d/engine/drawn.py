@@ -46,7 +46,8 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
     corners = np.array([edge.start for edge in body.profile.edges])
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    if (turn < -STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)).any():
+    straight = STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    if (turn < -straight).any():
         return None
     pieces: list[tuple[tuple[Convex, ...], list[Bore]]] = []
     grooves = []
@@ -57,7 +58,7 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
             grooves.append(Bore(arc.radius, 0.5 * abs(arc.sweep), body.length, T))
         else:
             pieces.append(((Rod(arc.radius, body.length, _pose(body, arc.centre)), _beyond_chord(body, arc)), []))
-    if (turn > STRAIGHT).any():
+    if (turn > straight).any():
         pieces.insert(0, ((prism(corners, body.start, body.end, body.frame),), grooves))
     elif grooves:
         return None

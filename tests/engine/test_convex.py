@@ -11,7 +11,9 @@ from scipy.spatial import ConvexHull
 
 from clamp3d.engine.convex import Rod, _deepest, convex_distance
 from clamp3d.engine.convex_depth import convex_depth
+from clamp3d.engine.distance import distance
 from clamp3d.engine.hull import Hull, hull
+from clamp3d.geometry import shapes
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
 from tests.hulls import apart
 
@@ -142,3 +144,19 @@ def test_the_depth_of_cylinders_that_lean_by_less_than_counts_as_parallel(tilt):
     truth = -0.1 - 10.0 * abs(tilt)
     assert found.lower - 1e-14 <= truth <= found.upper + 1e-14
     assert found.upper - found.lower <= 40.0 * abs(tilt) + 1e-12
+
+
+@pytest.mark.parametrize("size", [1e-5, 3e-5, 1e-3])
+def test_tiny_boxes_have_their_pieces(size):
+    d = distance(shapes.box(size, size, 1.0), shapes.box(1.0, 1.0, 1.0), translation(0.0, 0.0, 3.0))
+    assert (d.lower, d.upper) == (pytest.approx(2.0, abs=1e-9), pytest.approx(2.0, abs=1e-9))
+
+
+def test_a_small_cylinder_and_a_large_box_are_as_sharp_in_either_order():
+    rng, a, b = np.random.default_rng(3), shapes.cylinder(1.0, 1.0), shapes.box(1000.0, 1000.0, 10.0)
+    for _ in range(60):
+        T = rotation(rng.normal(size=3), rng.uniform(0.0, 3.0))
+        T[:3, 3] = 600.0 * rng.normal(size=3)
+        one, other = distance(a, b, T), distance(b, a, inverse(T))
+        assert max(one.lower, other.lower) <= min(one.upper, other.upper) + 1e-9
+        assert one.upper - one.lower < 1e-4
