@@ -19,7 +19,7 @@ from clamp3d.errors import escaped
 
 
 class ExitCode(IntEnum):
-    """What a command tells the shell."""
+    """Exit codes of the commands."""
 
     CLEAN = 0
     FINDING = 1

@@ -109,9 +109,9 @@ def _answers(a: ClosedForm, b: ClosedForm, T: Array) -> Iterator[Distance]:
         yield _with_witnesses(convex_distance(piece, np.eye(4), other, T), (piece, other), a, b, T)
 
 
-def kernel_distance(answer: SignedDistance, error: float = 0.0) -> Distance:
-    """The kernel's answer as a `Distance` in the groove's frame, with ``error`` mm more uncertainty."""
-    d, e = answer.distance, answer.error_bound + error
+def kernel_distance(answer: SignedDistance) -> Distance:
+    """The kernel's answer as a `Distance` in the groove's frame."""
+    d, e = answer.distance, answer.error_bound
     p, q = answer.point_on_groove, answer.point_on_cylinder
     return Distance(d - e, d + e, p, q, answer.normal, None, "features", "groove kernel")
 

@@ -220,7 +220,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         }
 
     def _with_margin(self, finding: dict[str, Any]) -> dict[str, Any]:
-        """A finding with some room around its place: what its parts share, else where they are nearest."""
+        """A finding with some room around its place: the common part, else the nearest points."""
         place = (finding["stop"], finding["a"], finding["b"])
         low, high = self._drawing.shared.get(place, (finding["low"], finding["high"]))
         margin = 0.1 * self._drawing.size
