@@ -9,9 +9,10 @@ pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not inst
 from clamp3d import check, load
 from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, judge, placed_pair, write_pairs
 
-GAPS = (2e-4, 0.0103, -5e-3, -0.03)  # scripts/check-placed asks for many more
+GAPS = ((0.0103, -0.03), (-5e-3, 0.0103))
+"""Gaps of every other family, mm: scripts/check-placed asks for many more."""
 SLOW = {"ring_in_groove", "ball_in_ring", "thread_in_tube", "ball_in_socket", "spline_in_bore"}
-"""Families of round or free-form faces: one gap on either side of the contact threshold."""
+"""Families of round or free-form faces: one gap."""
 
 
 def checked(pairs, folder):
@@ -22,10 +23,9 @@ def checked(pairs, folder):
 
 @pytest.mark.parametrize("family", [family for family in FAMILIES if family != "duplicate"])
 def test_no_verdict_is_wrong_and_every_pair_is_decided(family, tmp_path):
-    rng = np.random.default_rng(list(FAMILIES).index(family))
-    counts, lines = checked(
-        [placed_pair(family, rng, gap, splines=0.0) for gap in (GAPS[1:3] if family in SLOW else GAPS)], tmp_path
-    )
+    k = list(FAMILIES).index(family)
+    rng, gaps = np.random.default_rng(k), GAPS[k % 2][: 1 if family in SLOW else 2]
+    counts, lines = checked([placed_pair(family, rng, gap, splines=0.0) for gap in gaps], tmp_path)
     assert counts[family]["wrong"] == 0, lines
     assert counts[family]["uncertain"] == 0, lines
 
