@@ -20,22 +20,22 @@ import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, prepare_streams, show
 from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
 
-# Name -> (module and function, one line for the list of commands). A module is loaded when its command is called.
+# Name -> (module and class, one line for the list of commands). A module is loaded when its command is called.
 COMMANDS: dict[str, tuple[str, str]] = {
-    "run": ("run.command", "Assemble a clamp and print where every part ends up."),
-    "view": ("view.command", "Show the assembly in a browser, or write it as one page."),
-    "report": ("report.command", "Write a report for an assembly reviewer."),
-    "reproduce": ("reproduce.command", "Print Tables 1-5 of the paper beside this program's values."),
-    "compare": ("compare.command", "Measure every contact method: accuracy against speed."),
-    "stress": ("stress.command", "Count the errors of every contact method on hard cases with known answers."),
-    "measure-image": ("measure_image.command", "Measure a distance in a photograph by marked points."),
-    "fit": ("fit.command", "Find round grooves, cylinders and holes in a mesh."),
-    "export": ("export.command", "Write the parts as files for CAD review."),
-    "check": ("check.command", "Check which parts of a scene clash, touch or keep their clearance."),
-    "accept": ("check.accept_command", "Accept findings of check, with a reason."),
-    "sweep": ("sweep.command", "Map the start places that seat a wire, and how far it may lean."),
-    "tolerance": ("tolerance.command", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
-    "conductors": ("conductors.command", "List the conductor catalogue."),
+    "run": ("run.Run", "Assemble a clamp and print where every part ends up."),
+    "view": ("view.View", "Show the assembly in a browser, or write it as one page."),
+    "report": ("report.Report", "Write a report for an assembly reviewer."),
+    "reproduce": ("bench.Reproduce", "Print Tables 1-5 of the paper beside this program's values."),
+    "compare": ("bench.Compare", "Measure every contact method: accuracy against speed."),
+    "stress": ("bench.Stress", "Count the errors of every contact method on hard cases with known answers."),
+    "measure-image": ("bench.MeasureImage", "Measure a distance in a photograph by marked points."),
+    "fit": ("fit.Fit", "Find round grooves, cylinders and holes in a mesh."),
+    "export": ("export.Export", "Write the parts as files for CAD review."),
+    "check": ("check.Check", "Check which parts of a scene clash, touch or keep their clearance."),
+    "accept": ("check.Accept", "Accept findings of check, with a reason."),
+    "sweep": ("sweep.Sweep", "Map the start places that seat a wire, and how far it may lean."),
+    "tolerance": ("tolerance.Tolerance", "Sensitivity to each dimension, and a Monte Carlo over tolerances."),
+    "conductors": ("conductors.Conductors", "List the conductor catalogue."),
 }
 
 

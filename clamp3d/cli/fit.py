@@ -6,33 +6,35 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, UNITS, argument, declared, option
-from clamp3d.cli.progress import bar
-from clamp3d.cli.terminal import save, show
+from clamp3d.cli.options import JSON, UNITS, argument, command, option
+from clamp3d.cli.terminal import bar, save, show
+from clamp3d.fit.fit import fit_file
+from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
 
-@declared("fit")
-def command(
-    mesh: Path = argument(metavar="MESH", type=click.Path(path_type=Path)),
-    unit: str | None = option(
-        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]", type=click.Choice(UNITS)
-    ),
-    json_file: Path | None = JSON,
-    html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html"),
-    quiet: bool = option("No progress and no notes.", "--quiet", "-q"),
-) -> None:
+@command("fit")
+class Fit:
     """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) each with its error bound.
 
     A mesh without any is no error: exit code 0.
     """
-    from clamp3d.fit.fit import fit_file
-    from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
-    with bar(quiet) as report:
-        result = fit_file(mesh, unit=unit, progress=lambda stage, done: report(f"looking for {stage}", done, 1.0))
-    if not quiet:
-        for note in result.notes:
+    mesh: Path = argument(metavar="MESH", type=click.Path(path_type=Path))
+    unit: str | None = option(
+        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]", type=click.Choice(UNITS)
+    )
+    json_file: Path | None = JSON
+    html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html")
+    quiet: bool = option("No progress and no notes.", "--quiet", "-q")
+
+    def run(self) -> None:
+        """Fit, print and write."""
+        with bar(self.quiet) as report:
+            result = fit_file(
+                self.mesh, unit=self.unit, progress=lambda stage, done: report(f"looking for {stage}", done, 1.0)
+            )
+        for note in () if self.quiet else result.notes:
             show(f"note: {note}", err=True)
-    show(fit_to_text(result))
-    save(json_file, result.to_dict)
-    save(html_file, lambda: fit_to_html(result))
+        show(fit_to_text(result))
+        save(self.json_file, result.to_dict)
+        save(self.html_file, lambda: fit_to_html(result))

@@ -1,12 +1,11 @@
-"""Options are written once, as the defaults of a command's parameters; those that several commands share are here."""
+"""Commands are classes whose options are attributes; the options that several commands share are here."""
 
 from __future__ import annotations
 
 import inspect
 import math
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
     from clamp3d.engine.scene import Scene
     from clamp3d.geometry.shapes import Fit
 
-Declared = Callable[[str, str], click.Parameter]
-"""Makes the option or argument for a parameter with a name and an annotation."""
 UNITS = ("mm", "cm", "m", "in")
 
 
@@ -45,15 +42,20 @@ def radians(text: str | float) -> float:
     return math.radians(number(text))
 
 
+def couples(text: str, separator: str, example: str) -> list[tuple[str, str]]:
+    """The two sides of each item of a list with commas, which reads like the ``example``."""
+    rows = []
+    for item in text.split(","):
+        sides = tuple(side.strip() for side in item.split(separator))
+        if len(sides) != 2 or not all(sides):
+            raise click.BadParameter(f"must read like {example}, got {item!r}")
+        rows.append(sides)
+    return rows
+
+
 def joint_values(text: str) -> dict[str, float]:
     """Values by the names of joints, as the type of an option."""
-    values = {}
-    for item in text.split(","):
-        name, equals, value = item.partition("=")
-        if not equals or not name.strip():
-            raise click.BadParameter(f"must read like elbow=1.57,slide=20, got {item!r}")
-        values[name.strip()] = number(value)
-    return values
+    return {name: number(value) for name, value in couples(text, "=", "elbow=1.57,slide=20")}
 
 
 class Output(click.Path):
@@ -91,9 +93,9 @@ _USUAL: dict[str, dict[str, Any]] = {
 
 
 def option(text: str, *names: str, **settings: Any) -> Any:
-    """An option with the help ``text``, as the default of the parameter that gets its value.
+    """An option with the help ``text``, as the value of the attribute that gets what is given.
 
-    Without ``names`` it is called as the parameter. ``settings`` are those of `click.Option`; of a parameter that is
+    Without ``names`` it is called as the attribute. ``settings`` are those of `click.Option`; of an attribute that is
     annotated as a bool, a float or a Path the type follows from the annotation. A default is shown.
     """
 
@@ -105,40 +107,29 @@ def option(text: str, *names: str, **settings: Any) -> Any:
 
 
 def argument(**settings: Any) -> Any:
-    """A `click.Argument`, as the default of the parameter that gets its value."""
+    """A `click.Argument`, as the value of the attribute that gets what is given."""
     return lambda name, annotation: click.Argument([name], **settings)
 
 
-@dataclass(frozen=True)
-class _Group:
-    kind: type[Any]
-    members: Mapping[str, Declared]
+def command(name: str) -> Callable[[type[Any]], click.Command]:
+    """Decorator that makes a command of a class whose attributes, and those of its bases, are options and arguments.
 
+    What is given is in the attributes of an instance, whose method ``run`` is called.
+    """
 
-def group(kind: type[Any], **instead: Any) -> Any:
-    """Several options whose values come as one ``kind``: a dataclass with options as its defaults, or ``instead``."""
-    return _Group(kind, {field.name: instead.get(field.name, field.default) for field in fields(kind)})
-
-
-def declared(name: str) -> Callable[[Callable[..., None]], click.Command]:
-    """Decorator that makes a command of a function whose parameters have an `option`, `argument` or `group` each."""
-
-    def decorate(function: Callable[..., None]) -> click.Command:
-        groups: dict[str, _Group] = {}
-        parameters: list[click.Parameter] = []
-        for key, parameter in inspect.signature(function).parameters.items():
-            if isinstance(parameter.default, _Group):
-                groups[key] = parameter.default
-                types = {field.name: str(field.type) for field in fields(parameter.default.kind)}
-                parameters += [make(member, types[member]) for member, make in parameter.default.members.items()]
-            else:
-                parameters.append(parameter.default(key, parameter.annotation))
+    def decorate(kind: type[Any]) -> click.Command:
+        parameters: dict[str, click.Parameter] = {}
+        for base in kind.__mro__:
+            for key, annotation in inspect.get_annotations(base).items():
+                if key not in parameters:
+                    parameters[key] = getattr(base, key)(key, annotation)
 
         def call(**values: Any) -> None:
-            grouped = {key: g.kind(**{member: values.pop(member) for member in g.members}) for key, g in groups.items()}
-            function(**grouped, **values)
+            instance = kind()
+            vars(instance).update(values)
+            instance.run()
 
-        return click.Command(name, params=parameters, callback=call, help=inspect.getdoc(function))
+        return click.Command(name, params=[*parameters.values()], callback=call, help=inspect.getdoc(kind))
 
     return decorate
 
@@ -156,12 +147,16 @@ def complete_inputs(context: click.Context, parameter: click.Parameter, incomple
     return [*built_in, CompletionItem(incomplete, type="file")]
 
 
-QUIET = option("No progress.", "--quiet", "-q")
 CLEARANCE = option("Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM")
 JSON = option("Write the result as JSON; - is stdout.", "--json")
 
 
-@dataclass(frozen=True)
+class Quiet:
+    """Whether progress is shown."""
+
+    quiet: bool = option("No progress.", "--quiet", "-q")
+
+
 class ClampSource:
     """The clamp that a command is to work on."""
 
@@ -178,7 +173,6 @@ class ClampSource:
         return load_clamp(self.source, line=self.line, jumper=self.jumper)
 
 
-@dataclass(frozen=True)
 class Source(ClampSource):
     """What a command is to work on: a clamp, a scene or a file with parts."""
 
@@ -203,11 +197,7 @@ class Source(ClampSource):
         """A clamp, or a scene from a scene file or any file that holds bodies."""
         from clamp3d.scenefile.load import load
 
-        return load(**vars(self))
-
-
-SOURCE = group(Source)
-CLAMP = group(ClampSource)
+        return load(**{key: getattr(self, key) for key in (*ClampSource.__annotations__, *Source.__annotations__)})
 
 
 SEQUENCE: Any = option(
@@ -216,8 +206,7 @@ SEQUENCE: Any = option(
 )
 
 
-@dataclass(frozen=True)
-class Method:
+class Method(Quiet):
     """How grooves are measured, and how the final state is computed."""
 
     method: str = option(
@@ -242,9 +231,9 @@ class Method:
         "Tilt step of the stepped solver.  [default: 1]", "--tilt-step-deg", type=radians, metavar="A"
     )
 
-    def refuse(self) -> None:
+    def refuse_method(self) -> None:
         """Raise click.UsageError if anything was chosen: there is no clamp to use it for."""
-        if {*vars(self).values()} != {"cas", None}:
+        if {getattr(self, key) for key in Method.__annotations__} != {"cas", None}:
             raise click.UsageError("--method, --solver and their options go with a clamp, not with a scene")
 
     def settings(self, equilibria: bool | None = None) -> dict[str, Any]:
@@ -264,20 +253,15 @@ class Method:
         given = {key: value for key, value in moves.items() if value is not None}
         return {"solver": solver, "others": others} | given
 
-    def model(self, clamp: Clamp, *, quiet: bool = False) -> ContactModel:
+    def model(self, clamp: Clamp) -> ContactModel:
         """The contact model. Raises InputError for options that do not go with it."""
         from clamp3d.clamp.parts import parts
 
         settings: dict[str, Any] = {key: getattr(self, key) for key in ("unit_angle", "threshold", "mesh_error")}
-        return contact_model(self.method, parts(clamp), progress=False if quiet else None, **settings)
+        return contact_model(self.method, parts(clamp), progress=False if self.quiet else None, **settings)
 
 
-METHOD = group(Method)
-"""``--method`` and what goes with it, and the solver's options."""
-
-
-@dataclass(frozen=True)
-class Viewing:
+class Viewing(Quiet):
     """What a viewer is to show, and where."""
 
     html_file: Path | None = option("Write one page with the whole animation.", "--html")
@@ -295,7 +279,3 @@ class Viewing:
     )
     draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
     clearance: float | None = CLEARANCE
-
-
-VIEWING = group(Viewing)
-"""``--html --url --host --port ...``."""

@@ -1,70 +1,129 @@
-"""``clamp3d run``."""
+"""``clamp3d run``, and what it computes of torque and friction on request."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from clamp3d.cli.mechanics import MECHANICS, Mechanics
-from clamp3d.cli.options import CLAMP, JSON, METHOD, QUIET, VIEWING, ClampSource, Method, Viewing, declared, option
-from clamp3d.cli.progress import narrated
-from clamp3d.cli.terminal import finish, save, show
+import click
+
+from clamp3d.cli.options import JSON, ClampSource, Method, Viewing, command, number, option
+from clamp3d.cli.terminal import finish, narrated, save, show
 from clamp3d.errors import SequenceError
+from clamp3d.output.run_report import run_to_text
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
 
 
-@declared("run")
-def command(
-    source: ClampSource = CLAMP,
-    method: Method = METHOD,
-    equilibria: bool | None = option(
-        "Also report the other states that closing can end in.  [default: with method cas, exact solver]",
-        "--equilibria/--no-equilibria",
-        default=None,
-    ),
-    mechanics: Mechanics = MECHANICS,
-    json_file: Path | None = JSON,
-    view: bool = option("Show the run in a browser while it goes on; prints the page's address."),
-    viewing: Viewing = VIEWING,
-    quiet: bool = QUIET,
-) -> None:
+def numbers(text: str) -> tuple[float, ...]:
+    """Numbers with commas between them, as the type of an option."""
+    return tuple(number(part) for part in text.split(","))
+
+
+class Mechanics:
+    """Torque (Nm), friction of thread and nut face, measured splint distance (mm), friction of the grooves."""
+
+    torque: float | None = option(
+        "Also report the effect of this torque at the nut: preload, contact forces, when a wire slips.", metavar="NM"
+    )
+    friction: tuple[float, ...] | None = option(
+        "Friction of thread and nut face, with --torque.  [default: 0.1,0.14,0.2]", type=numbers, metavar="MU,..."
+    )
+    measured: float | None = option(
+        "Also report whether friction explains this measured splint distance.", metavar="MM"
+    )
+    groove_friction: tuple[float, ...] | None = option(
+        "Friction of the wires in their grooves, with --torque and --measured; alone: report the range of splint "
+        "distances at which the clamp stays.  [default: 0.1,0.2]",
+        type=numbers,
+        metavar="MU,...",
+    )
+
+    def check_mechanics(self, solver: str) -> None:
+        """Raise click.UsageError for options that do not go together."""
+        if self.friction is not None and self.torque is None:
+            raise click.UsageError("--friction goes with --torque")
+        if self._is_asked() and solver != "exact":
+            raise click.UsageError(f"--torque, --measured and --groove-friction go with --solver exact, not {solver}")
+
+    def mechanics(self, run: Assembly) -> tuple[str, dict[str, Any]]:
+        """Text and data for JSON of an assembled clamp; nothing if nothing was asked for."""
+        if not self._is_asked():
+            return "", {}
+        if not run.clamped:
+            return f"torque and friction: not computed, {run.status}", {}
+        from clamp3d.clamp.friction import FrictionBand
+        from clamp3d.clamp.torque import GROOVE_FRICTION, THREAD_FRICTION, coefficients, tighten
+        from clamp3d.output.forces_report import bands_to_text, measured_to_text, tightening_to_text
+
+        text, data = "", dict[str, Any]()
+        groove = self.groove_friction or GROOVE_FRICTION
+        if self.torque is not None:
+            tight = tighten(run, self.torque, friction=self.friction or THREAD_FRICTION, groove_friction=groove)
+            text, data["torque"] = f"\n{tightening_to_text(tight)}\n", tight.to_dict()
+        if self.torque is None or self.measured is not None:
+            finder = FrictionBand(run.clamp)
+            bands = [finder.band(mu) for mu in coefficients("groove friction", groove)]
+            text += f"\n{bands_to_text(bands)}\n"
+            data["friction_band"] = {"bands": [band.to_dict() for band in bands]}
+            if self.measured is not None:
+                text += f"{measured_to_text(finder, bands, self.measured)}\n"
+                measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
+                data["friction_band"]["measured"] = measured
+        return text.removesuffix("\n"), data
+
+    def _is_asked(self) -> bool:
+        return any(getattr(self, key) is not None for key in Mechanics.__annotations__)
+
+
+@command("run")
+class Run(ClampSource, Method, Mechanics, Viewing):
     """Assemble CLAMP (a built-in name or a TOML file) with its wires, and print where every part ends up.
 
     Exit code 1 if the clamp does not close on both wires, parts meet that should not, or a step of the sequence is
     blocked: the message names what blocks it, where and when, and the page shows it.
     """
-    settings = method.settings(equilibria)
-    mechanics.check(settings["solver"])
-    from clamp3d.output.run_report import run_to_text
 
-    loaded = source.clamp()
-    model = method.model(loaded, quiet=quiet)
-    page = None
-    if view or viewing.html_file is not None or viewing.url is not None:
-        from clamp3d.cli.viewing import Page
+    equilibria: bool | None = option(
+        "Also report the other states that closing can end in.  [default: with method cas, exact solver]",
+        "--equilibria/--no-equilibria",
+        default=None,
+    )
+    json_file: Path | None = JSON
+    view: bool = option("Show the run in a browser while it goes on; prints the page's address.")
 
-        page = Page(viewing, serve=view, quiet=quiet)
+    def run(self) -> None:
+        """Assemble, print and show."""
+        settings = self.settings(self.equilibria)
+        self.check_mechanics(settings["solver"])
+        clamp = self.clamp()
+        model, page = self.model(clamp), None
+        if self.view or self.html_file is not None or self.url is not None:
+            from clamp3d.cli.viewing import Page  # meshcat, for a page alone
 
-    def done(run: Assembly) -> None:
-        show(run_to_text(run))
-        text, more = mechanics.answer(run)
+            page = Page(self, serve=self.view)
+        try:
+            if page is not None:
+                result = page.assemble(clamp, model, settings, self._show)
+            else:
+                result = narrated(clamp, model, settings, self.quiet)
+                self._show(result)
+        except SequenceError as error:
+            data: dict[str, Any] = {
+                "status": f"not assembled: {error}",
+                "blocks": [block.to_dict() for block in error.blocks],
+            }
+            show(data["status"])
+            save(self.json_file, lambda: data)
+            if page is not None:
+                page.check(error.scene)
+            finish(True)
+        finish(not result.passed)
+
+    def _show(self, result: Assembly) -> None:
+        show(run_to_text(result))
+        text, data = self.mechanics(result)
         if text:
             show(text)
-        save(json_file, lambda: run.to_dict() | more)
-
-    try:
-        if page is not None:
-            result = page.assemble(loaded, model, settings, done)
-        else:
-            result = narrated(loaded, model, settings, quiet)
-            done(result)
-    except SequenceError as error:
-        status, blocks = f"not assembled: {error}", [block.to_dict() for block in error.blocks]
-        show(status)
-        save(json_file, lambda: {"status": status, "blocks": blocks})
-        if page is not None:
-            page.check(error.scene)
-        finish(True)
-    finish(not result.passed)
+        save(self.json_file, lambda: result.to_dict() | data)

@@ -16,8 +16,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.cli.options import Viewing
-from clamp3d.cli.progress import bar, narrated
-from clamp3d.cli.terminal import show
+from clamp3d.cli.terminal import bar, narrated, show
 from clamp3d.engine.check import check
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
@@ -34,7 +33,6 @@ class Page:
 
     viewing: Viewing
     serve: bool
-    quiet: bool
 
     def assemble(
         self,
@@ -50,10 +48,10 @@ class Page:
         """
         finished = None
         if not as_published(parse_sequence(settings.get("sequence", clamp.sequence))):
-            finished = narrated(clamp, model, settings, self.quiet)
+            finished = narrated(clamp, model, settings, self.viewing.quiet)
         overlays = dict(overlay(clamp, text) for text in self.viewing.overlays)
         with self._viewer(ClampStory(clamp, model, self.viewing.clearance), overlays) as viewer:
-            run = finished or narrated(clamp, model, settings, self.quiet, viewer.show)
+            run = finished or narrated(clamp, model, settings, self.viewing.quiet, viewer.show)
             viewer.finish(run)
             self._save(viewer)
             done(run)
@@ -64,7 +62,7 @@ class Page:
         if self.viewing.clearance is not None:
             scene = replace(scene, clearance=self.viewing.clearance)
         with self._viewer(scene) as viewer:
-            with bar(self.quiet) as report:
+            with bar(self.viewing.quiet) as report:
                 result = check(scene, progress=report, on_row=viewer.show_row if viewer.url is not None else None)
             viewer.finish(result)
             self._save(viewer)
@@ -92,7 +90,7 @@ class Page:
             yield viewer
             if serve:
                 with contextlib.suppress(KeyboardInterrupt):  # the usual way to end; the result decides the exit code
-                    if viewing.timeout is None and not self.quiet:
+                    if viewing.timeout is None and not self.viewing.quiet:
                         click.echo("serving the page until Ctrl-C ...", err=True)
                     threading.Event().wait(viewing.timeout)
 

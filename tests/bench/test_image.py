@@ -28,7 +28,7 @@ from clamp3d.bench.published import ACTUAL_DISTANCE, IMAGE_DISTANCES
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.result import Assembly
-from clamp3d.cli.measure_image import command
+from clamp3d.cli.bench import MeasureImage
 from clamp3d.errors import InputError
 
 
@@ -126,7 +126,7 @@ def test_the_command_measures_a_photograph(shown: Picture, tmp_path: Path) -> No
     (tmp_path / "text.png").write_text("not a picture")
     left, right, below = (f"{x:.3f},{y:.3f}" for x, y in shown.end_points)
     options = ["--points", f"{left} {below}", "--reference", f"{left} {right}", "--scale", "137"]
-    result = CliRunner().invoke(command, [str(file), *options, "--json", str(out)])
+    result = CliRunner().invoke(MeasureImage, [str(file), *options, "--json", str(out)])
     assert result.exit_code == 0, result.output
     assert "31.530 mm +- 1.597 mm" in result.stdout
     assert json.loads(out.read_text())["distance"] == pytest.approx(shown.distance, abs=1e-3)
@@ -136,6 +136,6 @@ def test_the_command_measures_a_photograph(shown: Picture, tmp_path: Path) -> No
         ([str(file), *options[:1], "1,2 3", *options[2:]], "must be two positions"),
         ([str(file), *options[:1], "1,2 30,99999", *options[2:]], "must lie in the picture, which is 637 x 754 px"),
     ):
-        result = CliRunner().invoke(command, arguments)
+        result = CliRunner().invoke(MeasureImage, arguments)
         assert result.exit_code != 0
         assert message in result.output + str(result.exception)

@@ -84,14 +84,6 @@ def test_every_file_option_writes_to_stdout_for_a_dash():
     assert [option.opts for option in files if not isinstance(option.type, Output)] == []
 
 
-def test_no_two_parameters_of_a_command_share_a_name():
-    """Options in groups come from several classes: of two with one name the second would take the first one's value."""
-    context = click.Context(cli.group)
-    for name in cli.COMMANDS:
-        names = [parameter.name for parameter in cli.group.get_command(context, name).params]
-        assert len(names) == len(set(names)), name
-
-
 @pytest.mark.parametrize(
     "arguments",
     [

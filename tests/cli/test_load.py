@@ -9,7 +9,6 @@ import trimesh
 
 import clamp3d
 from clamp3d import Clamp, InputError, Scene, load
-from clamp3d.cli.options import Source
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = Path(clamp3d.__file__).parent / "clamp" / "data" / "reference.toml"
@@ -98,12 +97,6 @@ def test_anything_else_is_one_clear_line(source, options, message, tmp_path, mon
         load(source, **options)
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
-
-
-def test_the_command_lines_argument_is_the_same():
-    assert Source("reference", "LJ-500", *[None] * 6, False).load() == load("reference", line="LJ-500")
-    with pytest.raises(InputError, match="line goes with a clamp"):
-        Source(str(ROOT / "examples" / "hinge" / "scene.toml"), "LJ-500", *[None] * 6, False).load()
 
 
 def test_a_scene_without_parts_is_refused(tmp_path):

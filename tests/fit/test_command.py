@@ -8,7 +8,7 @@ import trimesh
 from click.testing import CliRunner
 from fit_shapes import RADIUS, splint
 
-from clamp3d.cli.fit import command
+from clamp3d.cli.fit import Fit
 
 
 @pytest.fixture
@@ -18,9 +18,7 @@ def part(tmp_path):
 
 
 def test_table_json_and_page(part, tmp_path):
-    out = CliRunner().invoke(
-        command, [str(part), "--json", str(tmp_path / "a.json"), "--html", str(tmp_path / "a.html")]
-    )
+    out = CliRunner().invoke(Fit, [str(part), "--json", str(tmp_path / "a.json"), "--html", str(tmp_path / "a.html")])
     assert out.exit_code == 0
     assert re.search(r"^G1 +groove +23\.8012 ", out.stdout, re.MULTILINE)
     assert re.search(r"^H1 +through hole +11\.0000 ", out.stdout, re.MULTILINE)
@@ -35,7 +33,7 @@ def test_table_json_and_page(part, tmp_path):
 
 def test_mesh_without_features_is_an_answer(tmp_path):
     trimesh.creation.box([1.0, 2.0, 3.0]).export(tmp_path / "box.ply")
-    out = CliRunner().invoke(command, [str(tmp_path / "box.ply"), "--html", str(tmp_path / "b.html")])
+    out = CliRunner().invoke(Fit, [str(tmp_path / "box.ply"), "--html", str(tmp_path / "b.html")])
     assert out.exit_code == 0
     assert "no groove, no cylinder, no hole" in out.stdout
     assert "<tbody>" not in (tmp_path / "b.html").read_text()

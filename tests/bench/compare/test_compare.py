@@ -26,7 +26,7 @@ from clamp3d.bench.compare.peers import SERIES, load_peer, missing_peers, prepar
 from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compare, pareto
 from clamp3d.bench.compare.scene import chord_error
 from clamp3d.bench.machine import machine
-from clamp3d.cli.compare import command
+from clamp3d.cli.bench import Compare
 from clamp3d.errors import InputError
 
 QUICK = 0.01
@@ -192,7 +192,7 @@ def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.
 def test_the_command_shows_every_row_and_why_one_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "compare", lambda **_: _comparison())
     arguments = ["--json", str(tmp_path / "a.json"), "--plot", str(tmp_path / "a.svg"), "--peers"]
-    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    result = CliRunner().invoke(Compare, arguments, catch_exceptions=False)
     assert result.exit_code == 0
     for words in ("wedges 5 deg", "hulls 0.01", "not finished in 90 s", "not installed: pip install mujoco", "31.5300"):
         assert words in result.stdout
