@@ -5,7 +5,7 @@
 >>> wire = cylinder(6.5, 80.0)
 """
 
-from clamp3d.files.mesh_file import load_mesh
+from clamp3d.files.formats import load_mesh
 from clamp3d.geometry.mesh import Mesh, make_mesh
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc

@@ -16,7 +16,10 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.mesh import Array, Mesh, make_mesh
 from clamp3d.geometry.shapes import MeshShape, Shape
 
+MOST_BODIES = 20_000
+"""Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
 _NAMED = 4
+"""Missing bodies that a message names."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,52 +67,63 @@ class Body:
         return self.shape.mesh
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(eq=False)
 class Reading:
-    """Bodies of a file.
+    """What was read of a file.
 
     Attributes
     ----------
-    bodies : tuple of Body
-        What was read, in the file's order.
-    missing : tuple of str
+    bodies : list of Body
+        In the file's order.
+    missing : list of str
         Bodies that the file announces and that are not among them: name and reason.
-    notes : tuple of str
+    notes : list of str
         What was assumed or repaired, and what the file holds besides bodies.
-    joined : tuple of (str, str) or None
+    joined : list of (str, str) or None
         Of a robot: names of the links that a joint connects; bodies of one name are one link.
     """
 
-    bodies: tuple[Body, ...]
-    missing: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    joined: tuple[tuple[str, str], ...] | None = None
+    bodies: list[Body] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    joined: list[tuple[str, str]] | None = None
+
+    def add(self, name: str, shape: Shape | str, T: Array, component: Component | None = None) -> None:
+        """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
+        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
+            raise InputError(f"more than {MOST_BODIES} bodies")
+        if isinstance(shape, str):
+            self.missing.append(f"{name} ({shape})")
+        else:
+            self.bodies.append(Body(name, shape, T, component))
 
     def complete(self, path: str | Path, *, partial: bool = False) -> Reading:
         """Itself; with ``partial`` also if bodies are missing, which a note then says.
 
         Raises InputError if bodies are missing, or there is none.
         """
-        listed = "; ".join(self.missing[:_NAMED]) + (
-            f"; and {len(self.missing) - _NAMED} more" if len(self.missing) > _NAMED else ""
-        )
+        more = len(self.missing) - _NAMED
+        listed = "; ".join([*self.missing[:_NAMED], *([f"and {more} more"] if more > 0 else [])])
         if not self.bodies:
             raise InputError(f"{short(path)}: no body in the file" + (f": {listed}" if listed else ""))
-        if not self.missing:
-            return self
-        count = f"{len(self.bodies)} of {len(self.bodies) + len(self.missing)} bodies read; missing: {listed}"
-        if not partial:
-            raise InputError(f"{short(path)}: only {count} (--partial goes on with those)")
-        return replace(self, notes=(count, *self.notes))
+        if self.missing:
+            count = f"{len(self.bodies)} of {len(self.bodies) + len(self.missing)} bodies read; missing: {listed}"
+            if not partial:
+                raise InputError(f"{short(path)}: only {count} (--partial goes on with those)")
+            self.notes.insert(0, count)
+        return self
 
     def merged(self, name: str) -> Mesh:
         """All bodies, each at its place, as one mesh in mm."""
         if len(self.bodies) == 1 and np.array_equal(self.bodies[0].T, np.eye(4)):
             return self.bodies[0].mesh
-        starts = np.cumsum([0, *(len(body.mesh.vertices) for body in self.bodies)])
-        placed = [body.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies]
-        faces = [body.mesh.faces + start for body, start in zip(self.bodies, starts, strict=False)]
-        mesh = make_mesh(np.concatenate(placed), np.concatenate(faces), name=name)
+        import trimesh  # takes longer to load than most meshes to read
+
+        vertices, faces = trimesh.util.append_faces(
+            [body.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies],
+            [body.mesh.faces for body in self.bodies],
+        )
+        mesh = make_mesh(vertices, faces, name=name)
         return replace(mesh, notes=(*self.notes, *mesh.notes))
 
 

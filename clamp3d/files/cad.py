@@ -10,8 +10,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.bodies import Component, Reading
-from clamp3d.files.open_cascade import explore, volume_of
-from clamp3d.files.placing import Placer
+from clamp3d.files.open_cascade import explore, matrix, occ, volume_of
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.mesh import Array
 
@@ -50,9 +49,7 @@ class Key:
     """A TopoDS_Shape wherever it is placed, as a key: copies of one shape are equal."""
 
     def __init__(self, shape: Any) -> None:
-        from OCP.TopLoc import TopLoc_Location
-
-        self.shape = shape.Located(TopLoc_Location())
+        self.shape = shape.Located(occ.TopLoc_Location())
 
     def __hash__(self) -> int:
         return hash(self.shape)
@@ -61,20 +58,12 @@ class Key:
         return isinstance(other, Key) and bool(self.shape.IsSame(other.shape))
 
 
-def matrix(location: Any) -> Array:
-    """A TopLoc_Location as a pose (4, 4), mm."""
-    move = location.Transformation()
-    T = np.eye(4)
-    T[:3] = [[move.Value(r, c) for c in (1, 2, 3, 4)] for r in (1, 2, 3)]
-    return T
-
-
 def bodies_of(roots: Iterable[Node]) -> Reading:
     """All solids below ``roots`` with names and places, equal ones sharing a shape.
 
     What is no solid is among the reading's missing. Raises InputError for too many bodies.
     """
-    collector = Placer()
+    reading = Reading()
     shapes: dict[Key, BrepSolid | str] = {}
     loose = 0
     for node, component in _leaves(roots, None):
@@ -94,15 +83,15 @@ def bodies_of(roots: Iterable[Node]) -> Reading:
                 node.colour or node.colours.get(key) or node.colours.get(Key(node.shape)) or component.colour,
                 {k: node.colours[of] for k, of in enumerate(map(Key, explore(solid, "FACE"))) if of in node.colours},
             )
-            collector.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place, own)
+            reading.add(name, shapes[key] if is_rigid else "placed with a scale or a reflection", place, own)
         surfaces = [*explore(node.shape, "SHELL", "SOLID"), *explore(node.shape, "FACE", "SHELL")]
         if surfaces:
-            collector.add(node.name, "a surface, not a solid", component.T)
+            reading.add(node.name, "a surface, not a solid", component.T)
         elif not solids:
             loose += 1
     if loose:
-        collector.notes.append(f"products that hold curves or points only are left out: {loose}")
-    return collector.reading()
+        reading.notes.append(f"products that hold curves or points only are left out: {loose}")
+    return reading
 
 
 def _leaves(nodes: Iterable[Node], assembly: Component | None) -> Iterator[tuple[Node, Component]]:

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import traceback
 from collections import deque
 from contextlib import suppress
@@ -48,7 +49,8 @@ class Worker:
     """A Python process that calls functions on request, one at a time, until it is closed.
 
     It is started by the first call, and again by the next call after it ended or was stopped. It ends with its
-    caller, however that ends. Modules of the current folder are not imported in it (Python's ``-P``).
+    caller, however that ends, and is not for processes that are forked from that. Modules of the current folder are
+    not imported in it (Python's ``-P``).
 
     Parameters
     ----------
@@ -65,7 +67,6 @@ class Worker:
     def __init__(self, *, confined: bool = False) -> None:
         self._confined = confined
         self._process: subprocess.Popen[bytes] | None = None
-        self._owner = 0
         self._lock = threading.Lock()
         self._lines: deque[str] = deque(maxlen=50)
         self._listener = threading.Thread()
@@ -108,9 +109,9 @@ class Worker:
         """
         with self._lock:
             try:
-                if self._process is None or self._owner != os.getpid() or self._process.poll() is not None:
-                    self._start()
-                error, result = self._exchange((function, arguments, memory), time_limit)
+                if self._process is None or self._process.poll() is not None:
+                    self._process = self._start()
+                error, result = self._exchange(self._process, (function, arguments, memory), time_limit)
             except BaseException:  # also for Ctrl-C: the process may still be at work
                 self.close()
                 raise
@@ -121,7 +122,7 @@ class Worker:
     def close(self) -> None:
         """End the process at once, if there is one."""
         process, self._process = self._process, None
-        if process is None or self._owner != os.getpid():  # a forked process leaves it to the one that started it
+        if process is None:
             return
         process.kill()
         process.wait()
@@ -131,14 +132,13 @@ class Worker:
                 if pipe is not None:
                     pipe.close()
 
-    def _start(self) -> None:
+    def _start(self) -> subprocess.Popen[bytes]:
         self.close()
-        self._owner = os.getpid()
         own = str(Path(__file__).parents[2])  # also where that is the current folder, which is "" on the path
         folders = (own if os.path.abspath(folder) == own else folder for folder in sys.path)
         path = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
         # A session of its own keeps Ctrl-C with the caller, who then ends the worker.
-        process = self._process = subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-P", "-c", f"from clamp3d.files.child import serve; serve(confined={self._confined})"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -149,31 +149,25 @@ class Worker:
         self._lines = deque(maxlen=50)
         self._listener = threading.Thread(target=_keep_lines, args=(process.stderr, self._lines), daemon=True)
         self._listener.start()
+        return process
 
-    def _exchange(self, request: tuple[Any, ...], time_limit: float) -> tuple[Exception | None, Any]:
-        process = self._process
-        assert process is not None
+    def _exchange(self, process: subprocess.Popen[bytes], request: Any, time_limit: float) -> Any:
+        """The answer to a request. Raises what `call` says for a process that gives none."""
         assert process.stdin is not None
         assert process.stdout is not None
-        expired = threading.Event()
-
-        def end() -> None:
-            expired.set()
-            process.kill()
-
-        timer = threading.Timer(time_limit, end)
+        deadline = time.monotonic() + time_limit
+        timer = threading.Timer(time_limit, process.kill)
         timer.daemon = True
         timer.start()
         try:
             with suppress(BrokenPipeError):  # it has ended: said below
                 _send(process.stdin, pickle.dumps(request))
-            answer: tuple[Exception | None, Any] = pickle.load(process.stdout)
-            return answer
+            return pickle.load(process.stdout)
         except (EOFError, pickle.UnpicklingError):
             code = process.wait()
         finally:
             timer.cancel()
-        if expired.is_set():
+        if time.monotonic() >= deadline:
             raise WorkerTimeoutError(f"no answer in {time_limit:g} s")
         self._listener.join(timeout=5.0)
         if any(word in line for line in self.log for word in _OUT_OF_MEMORY):

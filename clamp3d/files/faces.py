@@ -9,12 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.files.open_cascade import explore, from_bytes
+from clamp3d.files.open_cascade import explore, from_bytes, occ
 from clamp3d.geometry.mesh import Array
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 """Kinds of a face; the index is the kind's number in `Surfaces.kind`."""
 PLANE, CYLINDER, CONE, SPHERE, TORUS, OTHER = range(6)
+_SIZES: dict[str, tuple[str, ...]] = {
+    "plane": (),
+    "cylinder": ("Radius",),
+    "cone": ("RefRadius", "SemiAngle"),
+    "sphere": ("Radius",),
+    "torus": ("MajorRadius", "MinorRadius"),
+}
+"""Open CASCADE's names of `Surfaces.size`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,41 +54,29 @@ def surfaces(brep: bytes) -> Surfaces:
 
 def surfaces_of(faces: list[Any]) -> Surfaces:
     """The same of a list of TopoDS_Face."""
-    from OCP.TopAbs import TopAbs_Orientation
-
-    rows = [surface_of(face) for face in faces]
-    outward = [face.Orientation() != TopAbs_Orientation.TopAbs_REVERSED for face in faces]
-    sense = [1.0 if out is direct else -1.0 for out, (*_, direct) in zip(outward, rows, strict=True)]
+    kinds, frames, sizes, senses = [], [], [], []
+    for face in faces:
+        surface = occ.BRepAdaptor_Surface(face)
+        name = surface.GetType().name.removeprefix("GeomAbs_").lower()
+        kind, frame, size, is_direct = OTHER, np.vstack([np.zeros(3), np.eye(3)]), [0.0, 0.0], True
+        if name in _SIZES:
+            kind, form = KINDS.index(name), getattr(surface, name.capitalize())()
+            place = form.Position()
+            axes = (place.XDirection(), place.YDirection(), place.Direction())
+            frame = np.array([place.Location().Coord(), *(axis.Coord() for axis in axes)])
+            size = [*(float(getattr(form, of)()) for of in _SIZES[name]), 0.0, 0.0][:2]
+            is_direct = bool(place.Direct())  # its own normal points away from the axis, or along z
+        is_outward = face.Orientation() != occ.TopAbs_Orientation.TopAbs_REVERSED
+        kinds.append(kind)
+        frames.append(frame)
+        sizes.append(size)
+        senses.append(1.0 if is_outward is is_direct else -1.0)
     return Surfaces(
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.array([row[1] for row in rows]).reshape(-1, 4, 3),
-        np.array([row[2] for row in rows]).reshape(-1, 2),
-        np.array(sense),
+        np.array(kinds, dtype=np.int64),
+        np.array(frames).reshape(-1, 4, 3),
+        np.array(sizes).reshape(-1, 2),
+        np.array(senses),
     )
-
-
-def surface_of(face: Any) -> tuple[int, Array, tuple[float, float], bool]:
-    """Kind, frame and sizes of a face's surface, and whether its own normal points away from the axis or along z."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-
-    surface = BRepAdaptor_Surface(face)
-    name = surface.GetType().name.removeprefix("GeomAbs_").lower()
-    kind = KINDS.index(name) if name in KINDS else OTHER
-    if kind == OTHER:
-        return OTHER, np.vstack([np.zeros(3), np.eye(3)]), (0.0, 0.0), True
-    form = getattr(surface, name.capitalize())()
-    position = form.Position()
-    axes = (position.XDirection(), position.YDirection(), position.Direction())
-    frame = np.array([position.Location().Coord(), *(axis.Coord() for axis in axes)])
-    if kind == PLANE:
-        size = (0.0, 0.0)
-    elif kind == CONE:
-        size = (float(form.RefRadius()), float(form.SemiAngle()))
-    elif kind == TORUS:
-        size = (float(form.MajorRadius()), float(form.MinorRadius()))
-    else:
-        size = (float(form.Radius()), 0.0)
-    return kind, frame, size, bool(position.Direct())
 
 
 def height(kind: int, frame: Array, size: Array, points: Array) -> Array:

@@ -70,26 +70,23 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
     if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
         placer.notes.append("skins and morph targets are left at rest")
     nodes = _nodes(tree)
+    names = [node.get("name") or tree["meshes"][node.get("mesh", 0)].get("name") for node in tree["nodes"]]
     meshes = {k: _Mesh(tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
-    scene = trimesh.load_scene(
-        io.BytesIO(json.dumps(_simplified(tree, meshes)).encode()),
-        file_type="gltf",
-        resolver=_Buffers(path, binary),
-        process=False,
-        skip_materials=True,
-    )
+    _simplify(tree, meshes)
+    raw, buffers = io.BytesIO(json.dumps(tree).encode()), _Buffers(path, binary)
+    scene = trimesh.load_scene(raw, file_type="gltf", resolver=buffers, process=False, skip_materials=True)
     for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
         meshes[int(key.partition("_")[0])].pieces.append(piece)
     for n in nodes:
         k = tree["nodes"][n]["mesh"]
-        name = str(tree["nodes"][n].get("name") or tree["meshes"][k].get("name") or path.stem)
+        name = str(names[n] or path.stem)
         if len(meshes[k].pieces) != len(meshes[k].primitives):
             placer.add(name, "not readable", np.eye(4))
         elif meshes[k].pieces:
             placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
         else:
             placer.notes.append(f"{name}: points or lines, left out")
-    return placer.reading()
+    return placer
 
 
 def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -169,17 +166,14 @@ class _Mesh:
         return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
 
 
-def _simplified(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> dict[str, Any]:
-    """The file with nothing in it but what bodies are made of; nodes and meshes are called by their numbers."""
-    places = ("children", "matrix", "translation", "rotation", "scale", "mesh")
-    primitives = [meshes[k].primitives if k in meshes else [] for k in range(len(tree.get("meshes", [])))]
-    return {key: tree.get(key, []) for key in ("scenes", "accessors", "bufferViews")} | {
-        "asset": tree.get("asset", {}),
-        "scene": tree.get("scene", 0),
-        "meshes": [{"name": str(k), "primitives": kept} for k, kept in enumerate(primitives)],
-        "nodes": [
-            {"name": str(k)} | {key: node[key] for key in places if key in node}
-            for k, node in enumerate(tree.get("nodes", []))
-        ],
-        "buffers": [{"uri": ""} | buffer for buffer in tree.get("buffers", [])],
-    }
+def _simplify(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> None:
+    """Leave nothing in the file but what bodies are made of, and call nodes and meshes by their numbers."""
+    for n, node in enumerate(tree["nodes"]):
+        node["name"] = str(n)
+        node.pop("camera", None)  # trimesh would leave out what is below
+    tree["meshes"] = [
+        {"name": str(k), "primitives": meshes[k].primitives if k in meshes else []}
+        for k in range(len(tree.get("meshes", [])))
+    ]
+    for buffer in tree.get("buffers", []):
+        buffer.setdefault("uri", "")

@@ -14,7 +14,8 @@ import numpy as np
 from clamp3d.checks import shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
-from clamp3d.files.cad import Node, bodies_of, matrix
+from clamp3d.files.cad import Node, bodies_of
+from clamp3d.files.open_cascade import matrix
 from clamp3d.files.placing import Placer
 from clamp3d.geometry.mesh import Array, IntArray
 
@@ -75,7 +76,7 @@ def _trimesh(source: Any) -> tuple[Reading, str]:
     placer = Placer(unit[source.units])
     if hasattr(source, "faces"):
         placer.place("part", 0, partial(_arrays, source), np.eye(4))
-        return placer.reading(), "part"
+        return placer, "part"
     if not hasattr(source, "graph"):
         raise InputError(f"source must be a trimesh.Scene or a trimesh.Trimesh, got {type(source).__name__}")
     for name in source.graph.nodes_geometry:
@@ -85,7 +86,7 @@ def _trimesh(source: Any) -> tuple[Reading, str]:
             placer.notes.append(f"{name}: {type(mesh).__name__}, left out")
             continue
         placer.place(str(name), key, partial(_arrays, mesh), np.asarray(T))
-    return placer.reading(), "scene"
+    return placer, "scene"
 
 
 def _arrays(mesh: Any) -> tuple[Array, IntArray]:

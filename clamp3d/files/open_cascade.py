@@ -13,14 +13,29 @@ from clamp3d.errors import MissingLibraryError
 from clamp3d.geometry.mesh import Array
 
 
+class _OpenCascade:
+    """The classes of Open CASCADE as attributes; the first that is asked for loads it."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        require_open_cascade()
+        import OCP
+
+        setattr(self, name, getattr(getattr(OCP, name.partition("_")[0]), name))  # gp_Pnt is in the module gp
+        return vars(self)[name]
+
+
+occ: Any = _OpenCascade()
+"""`occ.gp_Pnt` and all others. Raises MissingLibraryError if Open CASCADE is not installed."""
+
+
 def require_open_cascade() -> None:
     """Load Open CASCADE and keep it from printing on stdout. Raises MissingLibraryError if it is not installed."""
     try:
-        import OCP  # noqa: F401
+        from OCP.Message import Message
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
-    from OCP.Message import Message
-
     messenger = Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
@@ -28,11 +43,9 @@ def require_open_cascade() -> None:
 
 def to_bytes(shape: Any) -> bytes:
     """A TopoDS_Shape in Open CASCADE's binary format, without triangles."""
-    from OCP.BinTools import BinTools, BinTools_FormatVersion
-
     stream = io.BytesIO()
-    version = BinTools_FormatVersion.BinTools_FormatVersion_VERSION_4
-    BinTools.Write_s(shape, stream, False, False, version)
+    version = occ.BinTools_FormatVersion.BinTools_FormatVersion_VERSION_4
+    occ.BinTools.Write_s(shape, stream, False, False, version)
     return stream.getvalue()
 
 
@@ -45,23 +58,17 @@ def from_bytes(brep: bytes) -> Any:
 def parse(brep: bytes) -> Any:
     """A new TopoDS_Shape of the bytes. Raises MissingLibraryError without Open CASCADE."""
     require_open_cascade()
-    from OCP.BinTools import BinTools
-    from OCP.TopoDS import TopoDS_Shape
 
-    shape = TopoDS_Shape()
-    BinTools.Read_s(shape, io.BytesIO(brep))
+    shape = occ.TopoDS_Shape()
+    occ.BinTools.Read_s(shape, io.BytesIO(brep))
     return shape
 
 
 def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
     """Sub-shapes of a ``kind`` ("SOLID", "FACE", ...), ``outside`` of those of another, in the explorer's order."""
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
-
     name = kind.capitalize()
-    cast = getattr(TopoDS, f"{name}_s", None) or getattr(TopoDS, name)
-    walk = TopExp_Explorer(shape, *(getattr(TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside)))
+    cast = getattr(occ.TopoDS, f"{name}_s", None) or getattr(occ.TopoDS, name)
+    walk = occ.TopExp_Explorer(shape, *(getattr(occ.TopAbs_ShapeEnum, f"TopAbs_{k}") for k in (kind, outside)))
     while walk.More():
         yield cast(walk.Current())
         walk.Next()
@@ -69,11 +76,8 @@ def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
 
 def bounds_of(shape: Any) -> Array:
     """Lower and upper corner (2, 3) of a box that holds a TopoDS_Shape, mm."""
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    box = occ.Bnd_Box()
+    occ.BRepBndLib.AddOptimal_s(shape, box, False, False)
     return np.array([box.CornerMin().Coord(), box.CornerMax().Coord()])
 
 
@@ -88,11 +92,8 @@ def area_of(shape: Any) -> float:
 
 
 def _integral(shape: Any, function: str) -> float:
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-
-    properties = GProp_GProps()
-    getattr(BRepGProp, function)(shape, properties)
+    properties = occ.GProp_GProps()
+    getattr(occ.BRepGProp, function)(shape, properties)
     return float(properties.Mass())
 
 
@@ -106,11 +107,16 @@ def moved(shape: Any, T: Array) -> Any:
     return shape.Moved(location(T))
 
 
+def matrix(location: Any) -> Array:
+    """A TopLoc_Location as a pose (4, 4), mm."""
+    move = location.Transformation()
+    T = np.eye(4)
+    T[:3] = [[move.Value(r, c) for c in (1, 2, 3, 4)] for r in (1, 2, 3)]
+    return T
+
+
 def location(T: Array) -> Any:
     """A pose (4, 4) in mm as a TopLoc_Location."""
-    from OCP.gp import gp_Trsf
-    from OCP.TopLoc import TopLoc_Location
-
-    place = gp_Trsf()
+    place = occ.gp_Trsf()
     place.SetValues(*np.asarray(T)[:3].ravel().tolist())
-    return TopLoc_Location(place)
+    return occ.TopLoc_Location(place)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, volume_of
-from clamp3d.files.tessellation import ANGLE, triangles_of
+from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, volume_of
+from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
 from clamp3d.geometry.mesh import Array
 
 TOLERANCE = 1e-6
@@ -42,9 +42,7 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
 
     Raises Clamp3dError if Open CASCADE finds none.
     """
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-
-    search = BRepExtrema_DistShapeShape(from_bytes(a), moved(from_bytes(b), T))
+    search = occ.BRepExtrema_DistShapeShape(from_bytes(a), moved(from_bytes(b), T))
     if not search.IsDone() or search.NbSolution() < 1:
         raise Clamp3dError("Open CASCADE finds no distance of the two solids")
     p, q = (np.array(x.Coord()) for x in (search.PointOnShape1(1), search.PointOnShape2(1)))
@@ -57,10 +55,7 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
     Its border is meshed with chords that are ``share`` of its thickness, volume over area, or of its size divided by
     `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
     """
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-
-    made = BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
+    made = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
     if not made.IsDone():
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     shape = made.Shape()
@@ -68,7 +63,7 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
         return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
-    BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
+    occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
     samples = [_samples(face, k) for k, face in enumerate(explore(shape, "FACE"))]
     return CommonPart(volume, area, box, np.vstack([points for points, _ in samples]), max(off for _, off in samples))
 
@@ -78,9 +73,6 @@ def _samples(face: Any, number: int) -> tuple[Array, float]:
 
     Meshes of a face may have no point inside of it, so its triangles are cut in the surface's parameters.
     """
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-
-    surface = BRepAdaptor_Surface(face)
     _, triangles, uv = triangles_of(face, number)
     corners = uv[triangles]
     while 0 < len(corners) < _SAMPLES:
@@ -89,7 +81,7 @@ def _samples(face: Any, number: int) -> tuple[Array, float]:
         corners = np.concatenate([middles, *at_corners])
     everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
     uv, place = np.unique(everything, axis=0, return_inverse=True)  # triangles share their corners
-    points = np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
+    points = points_on(face, uv)
     return points, float(_heights(points[place.reshape(-1, 4)]).max(initial=0.0))
 
 
@@ -104,19 +96,13 @@ def _heights(points: Array) -> Array:
 
 def depths(brep: bytes, points: Array) -> Array:
     """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-    from OCP.gp import gp_Pnt
-    from OCP.TopAbs import TopAbs_State
-
     shape = from_bytes(brep)
-    shells, side = [*explore(shape, "SHELL")], BRepClass3d_SolidClassifier(shape)
+    shells, side = [*explore(shape, "SHELL")], occ.BRepClass3d_SolidClassifier(shape)
     signed = np.empty(len(points))
     for k, point in enumerate(points.tolist()):
-        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex()
-        signed[k] = min(BRepExtrema_DistShapeShape(shell, vertex).Value() for shell in shells)
-        side.Perform(gp_Pnt(*point), TOLERANCE)
-        if side.State() == TopAbs_State.TopAbs_OUT:
+        vertex = occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point)).Vertex()
+        signed[k] = min(occ.BRepExtrema_DistShapeShape(shell, vertex).Value() for shell in shells)
+        side.Perform(occ.gp_Pnt(*point), TOLERANCE)
+        if side.State() == occ.TopAbs_State.TopAbs_OUT:
             signed[k] = -signed[k]
     return signed

@@ -1,48 +1,26 @@
-"""Bodies of a file as they are read: counted, and meshes brought to mm, with Z up and placed rigidly."""
+"""Meshes of a file as they are read: brought to mm, with Z up and placed rigidly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 
 import numpy as np
 
 from clamp3d.errors import InputError
-from clamp3d.files.bodies import Body, Component, Reading
+from clamp3d.files.bodies import Reading
 from clamp3d.geometry.mesh import Array, IntArray, make_mesh
 from clamp3d.geometry.pose import nearest_rigid
-from clamp3d.geometry.shapes import MeshShape, Shape
-
-MOST_BODIES = 20_000
-"""Bodies that a file may place: a few hundred bytes can name each other into millions of them."""
+from clamp3d.geometry.shapes import MeshShape
 
 
-class Placer:
-    """Collects the bodies of a file, and those that are missing, in the file's order.
-
-    Of meshes the unit is ``scale`` mm, and the axes are turned by ``R`` (3, 3).
-    """
+class Placer(Reading):
+    """A reading to which meshes are added whose unit is ``scale`` mm and whose axes are turned by ``R`` (3, 3)."""
 
     def __init__(self, scale: float = 1.0, R: Array | None = None) -> None:
-        self.bodies: list[Body] = []
-        self.missing: list[str] = []
-        self.notes: list[str] = []
+        super().__init__()
         self.scale = scale
         self.R = np.eye(3) if R is None else R
         self._shapes: dict[tuple[Hashable, bytes], MeshShape | str] = {}
-
-    def add(self, name: str, shape: Shape | str, T: Array, component: Component | None = None) -> None:
-        """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""
-        if len(self.bodies) + len(self.missing) >= MOST_BODIES:
-            raise InputError(f"more than {MOST_BODIES} bodies")
-        if isinstance(shape, str):
-            self.missing.append(f"{name} ({shape})")
-        else:
-            self.bodies.append(Body(name, shape, T, component))
-
-    def reading(self, joined: Iterable[tuple[str, str]] | None = None) -> Reading:
-        """What was collected."""
-        links = None if joined is None else tuple(joined)
-        return Reading(tuple(self.bodies), tuple(self.missing), tuple(self.notes), links)
 
     def place(self, name: str, key: Hashable, arrays: Callable[[], tuple[Array, IntArray]], T: Array) -> None:
         """One more body: vertices and faces that ``arrays`` gives, the same for each ``key``, at ``T`` (4, 4).

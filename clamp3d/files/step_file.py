@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,8 @@ import numpy as np
 from clamp3d.checks import readable_file, shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
-from clamp3d.files.cad import Key, Node, bodies_of, matrix
-from clamp3d.files.open_cascade import explore, require_open_cascade
+from clamp3d.files.cad import Key, Node, bodies_of
+from clamp3d.files.open_cascade import explore, matrix, occ
 from clamp3d.files.part21 import Announced, announced
 from clamp3d.files.worker import OUTSIDE, may_read
 
@@ -37,27 +36,19 @@ def read_step(path: Path, _: str | None = None) -> Reading:
 
     Raises InputError if its text is damaged or Open CASCADE cannot read it.
     """
-    require_open_cascade()
-    from OCP.STEPCAFControl import STEPCAFControl_Reader
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
-
-    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
-    reader = STEPCAFControl_Reader()
+    document = occ.TDocStd_Document(occ.TCollection_ExtendedString("XmlOcaf"))
+    occ.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
     contents = _contents(path)
-    _open(reader, path)
-    if not reader.Transfer(document):
+    if not _open(path).Transfer(document):
         raise InputError("not a readable STEP file")
-    reading = bodies_of(_roots(document, path.stem))
-    return replace(reading, missing=(*_lost(document, [*contents.values()]), *reading.missing))
+    products = [*_children(occ.XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).BaseLabel())]
+    reading = bodies_of(_node(x, path.stem) for x in products if occ.XCAFDoc_ShapeTool.IsFree_s(x))
+    reading.missing[:0] = _lost(products, contents)
+    return reading
 
 
-def _contents(path: Path) -> dict[Path, Announced]:
+def _contents(path: Path) -> list[Announced]:
     """What a file and the files that hold its parts announce. Raises InputError unless all of them are whole."""
-    from OCP.STEPCAFControl import STEPCAFControl_Reader
-
     contents = {path: announced(path)}
     waiting = [*contents[path].files]
     while waiting:
@@ -68,21 +59,21 @@ def _contents(path: Path) -> dict[Path, Announced]:
             raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that")
         try:
             readable_file(file)
-            _open(STEPCAFControl_Reader(), file)
+            _open(file)
         except InputError as error:
             raise InputError(f"names {shown(name)}: {error}") from None
         contents[file] = announced(file)
         waiting += contents[file].files
-    return contents
+    return [*contents.values()]
 
 
-def _open(reader: Any, path: Path) -> None:
-    """Read the text of a file. Raises InputError if it is damaged."""
-    from OCP.IFSelect import IFSelect_ReturnStatus
-
-    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+def _open(path: Path) -> Any:
+    """A reader that has read the text of a file. Raises InputError if it is damaged."""
+    reader = occ.STEPCAFControl_Reader()
+    if reader.ReadFile(str(path)) != occ.IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("not a readable STEP file, or it is cut off")
     _check_whole(reader)
+    return reader
 
 
 def _check_whole(reader: Any) -> None:
@@ -100,41 +91,27 @@ def _check_whole(reader: Any) -> None:
         checks.Next()
 
 
-def _roots(document: Any, stem: str) -> Iterator[Node]:
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
-    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
-
-    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    for label in _children(tool.BaseLabel()):
-        if Tool.IsShape_s(label) and Tool.IsFree_s(label):
-            yield _node(label, stem)
-
-
 def _node(label: Any, otherwise: str) -> Node:
     """A label of the product tree: its name, placement and shape, or the labels below it."""
-    from OCP.TDF import TDF_Label
-    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
-
-    product = TDF_Label()
-    if not Tool.GetReferredShape_s(label, product):
+    tree = occ.XCAFDoc_ShapeTool
+    product = occ.TDF_Label()
+    if not tree.GetReferredShape_s(label, product):
         product = label
     name = _name(product) or _name(label) or otherwise
-    T = matrix(Tool.GetLocation_s(label))
-    if Tool.IsAssembly_s(product):
-        below = (_node(child, name) for child in _children(product) if Tool.IsComponent_s(child))
+    T = matrix(tree.GetLocation_s(label))
+    if tree.IsAssembly_s(product):
+        below = (_node(child, name) for child in _children(product) if tree.IsComponent_s(child))
         return Node(name, T, None, below, _name(label), _colour(label) or _colour(product))
-    parts = {Key(Tool.GetShape_s(x)): x for x in (product, *_children(product)) if Tool.IsShape_s(x)}
+    parts = {Key(tree.GetShape_s(x)): x for x in (product, *_children(product)) if tree.IsShape_s(x)}
     names = {key: _name(x) for key, x in parts.items() if x is not product}
     colours = {key: colour for key, x in parts.items() if (colour := _colour(x))}
     if product is label:  # a shape that is no instance holds its place itself
         T = np.eye(4)
-    return Node(name, T, Tool.GetShape_s(product), (), _name(label), _colour(label), names, colours)
+    return Node(name, T, tree.GetShape_s(product), (), _name(label), _colour(label), names, colours)
 
 
 def _children(label: Any) -> Iterator[Any]:
-    from OCP.TDF import TDF_ChildIterator
-
-    walk = TDF_ChildIterator(label)
+    walk = occ.TDF_ChildIterator(label)
     while walk.More():
         yield walk.Value()
         walk.Next()
@@ -142,34 +119,25 @@ def _children(label: Any) -> Iterator[Any]:
 
 def _name(label: Any) -> str:
     """A label's name; none where Open CASCADE has put the label's own address, as in ``=>[0:1:1:2]``."""
-    from OCP.TDataStd import TDataStd_Name
-
-    key = TDataStd_Name.GetID_s()
-    if not label.IsAttribute(key):  # FindAttribute ends the process on a label without one (a coloured face)
+    attribute = occ.TDataStd_Name()
+    if not label.IsAttribute(attribute.ID()):  # FindAttribute ends the process on a label without one (a coloured face)
         return ""
-    attribute = TDataStd_Name()
-    label.FindAttribute(key, attribute)
+    label.FindAttribute(attribute.ID(), attribute)
     name = str(attribute.Get().ToExtString()).strip()
     return "" if name.startswith("=>[") else name
 
 
 def _colour(label: Any) -> str | None:
     """The colour "#RRGGBB" that a label states, of its surface before that of its curves."""
-    from OCP.Quantity import Quantity_Color
-    from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
-
-    colour = Quantity_Color()
-    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
-        if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
-            return str(Quantity_Color.ColorToHex_s(colour).ToCString())
+    colour, kinds = occ.Quantity_Color(), occ.XCAFDoc_ColorType
+    for kind in (kinds.XCAFDoc_ColorSurf, kinds.XCAFDoc_ColorGen):
+        if occ.XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
+            return str(occ.Quantity_Color.ColorToHex_s(colour).ToCString())
     return None
 
 
-def _lost(document: Any, contents: Iterable[Announced]) -> Iterator[str]:
+def _lost(products: list[Any], contents: list[Announced]) -> Iterator[str]:
     """Bodies and instances that the files announce and Open CASCADE has not made."""
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
-    from OCP.XCAFDoc import XCAFDoc_ShapeTool as Tool
-
     counts: Counter[str] = Counter()
     for content in contents:
         yield from content.orphans
@@ -177,11 +145,11 @@ def _lost(document: Any, contents: Iterable[Announced]) -> Iterator[str]:
     for kind, count in counts.items():
         if _OTHERS.fullmatch(kind):
             yield f"{count} {kind}, which Open CASCADE does not read"
-    products = [*_children(XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).BaseLabel())]
-    shells = {Key(shell) for product in products for shell in explore(Tool.GetShape_s(product), "SHELL")}
+    tree = occ.XCAFDoc_ShapeTool
+    shells = {Key(shell) for product in products for shell in explore(tree.GetShape_s(product), "SHELL")}
     if (closed := counts["CLOSED_SHELL"]) > len(shells):
         yield f"{closed - len(shells)} of the file's {closed} closed shells (not readable)"
-    instances = sum(Tool.IsComponent_s(below) for product in products for below in _children(product))
+    instances = sum(tree.IsComponent_s(below) for product in products for below in _children(product))
     uses, places = (counts[kind] for kind in ("NEXT_ASSEMBLY_USAGE_OCCURRENCE", _PLACE))
     if max(uses, places) > instances or 0 < places < uses:
         yield f"{uses} instances in the tree, {places} places for them, {instances} read"

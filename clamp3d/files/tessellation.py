@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import OTHER, PLANE, Surfaces, height, surfaces_of
-from clamp3d.files.open_cascade import explore, from_bytes
+from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ
 from clamp3d.geometry.mesh import Array, IntArray
 
 ANGLE = 0.35
@@ -46,12 +47,9 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
 
     Raises Clamp3dError if a face gets no triangles.
     """
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.BRepTools import BRepTools
-
     solid = from_bytes(brep)
-    BRepTools.Clean_s(solid)
-    BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
+    occ.BRepTools.Clean_s(solid)
+    occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
     faces = [*explore(solid, "FACE")]
     form = surfaces_of(faces)
     corners, triples, numbers, errors = [], [], [], []
@@ -77,74 +75,58 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
 
 def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
     """Points (n, 3), triangles (m, 3) wound outward, and the surface parameters (n, 2) of a meshed face."""
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopLoc import TopLoc_Location
-
-    place = TopLoc_Location()
-    triangulation = BRep_Tool.Triangulation_s(face, place)
+    place = occ.TopLoc_Location()
+    triangulation = occ.BRep_Tool.Triangulation_s(face, place)
     if triangulation is None:
         raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
     count = range(1, triangulation.NbNodes() + 1)
-    points = np.array([triangulation.Node(i).Coord() for i in count])
+    T = matrix(place)
+    points = np.array([triangulation.Node(i).Coord() for i in count]) @ T[:3, :3].T + T[:3, 3]
     uv = np.array([triangulation.UVNode(i).Coord() for i in count])
     triangles = np.array([triangulation.Triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)]) - 1
-    if not place.IsIdentity():
-        move = place.Transformation()
-        M = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-        points = points @ M[:, :3].T + M[:, 3]
-    if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
+    if face.Orientation() == occ.TopAbs_Orientation.TopAbs_REVERSED:
         triangles = triangles[:, ::-1]
     return points, triangles.reshape(-1, 3), uv
 
 
+def points_on(face: Any, uv: Array) -> Array:
+    """Points (k, 3) of a face's surface at its parameters (k, 2)."""
+    surface = occ.BRepAdaptor_Surface(face)
+    return np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
+
+
 def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntArray, uv: Array) -> Array:
     """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `SAMPLED`."""
-    kind = int(form.kind[k])
-    P = points[triangles]
-    middles = 0.5 * (P + np.roll(P, -1, axis=1))
+    kind, (middles, at) = int(form.kind[k]), (_middles(x[triangles]) for x in (points, uv))
     if kind == OTHER:
-        from OCP.BRepAdaptor import BRepAdaptor_Surface
+        off = np.linalg.norm(points_on(face, at.reshape(-1, 2)) - middles.reshape(-1, 3), axis=1)
+        corner = 0.0
+    else:
+        off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
+        corner = float(heights.max())
+    factor = 1.0 if kind == PLANE else SAMPLED
+    return np.asarray(factor * off.reshape(-1, 3).max(axis=1) + corner)
 
-        surface = BRepAdaptor_Surface(face)
-        at = uv[triangles]
-        at = 0.5 * (at + np.roll(at, -1, axis=1))
-        true = np.array([surface.Value(u, v).Coord() for u, v in at.reshape(-1, 2).tolist()]).reshape(-1, 3, 3)
-        return np.asarray(SAMPLED * np.linalg.norm(true - middles, axis=2).max(axis=1))
-    off = np.abs(height(kind, form.frame[k], form.size[k], middles.reshape(-1, 3))).reshape(-1, 3).max(axis=1)
-    corner = float(np.abs(height(kind, form.frame[k], form.size[k], points)).max())
-    return np.asarray(off + corner if kind == PLANE else SAMPLED * off + corner)
+
+def _middles(corners: Array) -> Array:
+    return np.asarray(0.5 * (corners + np.roll(corners, -1, axis=1)))
 
 
 def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.GeomAbs import GeomAbs_CurveType
-    from OCP.TopLoc import TopLoc_Location
+    from scipy.sparse import dok_array  # the process that asks for triangles needs none of it
 
-    place = TopLoc_Location()
-    triangulation = BRep_Tool.Triangulation_s(face, place)
-    n = len(points)
-    keys, sags = [np.empty(0, dtype=np.int64)], [np.empty(0)]
+    triangulation = occ.BRep_Tool.Triangulation_s(face, place := occ.TopLoc_Location())
+    sags = dok_array((len(points), len(points)))
     for edge in explore(face, "EDGE"):
-        polygon = BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place)
-        if polygon is None or BRep_Tool.Degenerated_s(edge):
+        polygon, curve = occ.BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place), None
+        if polygon is not None and not occ.BRep_Tool.Degenerated_s(edge):
+            curve = occ.BRepAdaptor_Curve(edge)
+        if curve is None or curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line:
             continue
-        curve = BRepAdaptor_Curve(edge)
-        if curve.GetType() == GeomAbs_CurveType.GeomAbs_Line:
-            continue
-        at = np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)]) - 1
-        t = np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
-        true = np.array([curve.Value(s).Coord() for s in (0.5 * (t[1:] + t[:-1])).tolist()]).reshape(-1, 3)
-        sags.append(SAMPLED * np.linalg.norm(true - 0.5 * (points[at[1:]] + points[at[:-1]]), axis=1))
-        keys.append(np.minimum(at[1:], at[:-1]) * n + np.maximum(at[1:], at[:-1]))
-    key, sag = np.concatenate(keys), np.concatenate(sags)
-    if not len(key):
-        return np.zeros(len(triangles))
-    order = np.argsort(key)
-    key, sag = key[order], sag[order]
-    ends = np.roll(triangles, -1, axis=1)
-    sides = np.minimum(triangles, ends) * n + np.maximum(triangles, ends)
-    row = np.minimum(np.searchsorted(key, sides), len(key) - 1)
-    return np.asarray(np.where(key[row] == sides, sag[row], 0.0).max(axis=1))
+        nodes = range(1, polygon.NbNodes() + 1)
+        for i, j in pairwise(nodes):
+            a, b = polygon.Node(i) - 1, polygon.Node(j) - 1
+            true = curve.Value(0.5 * (polygon.Parameter(i) + polygon.Parameter(j))).Coord()
+            sags[a, b] = sags[b, a] = SAMPLED * np.linalg.norm(true - 0.5 * (points[a] + points[b]))
+    return np.asarray(sags.tocsr()[triangles, np.roll(triangles, -1, axis=1)].toarray().max(axis=1))

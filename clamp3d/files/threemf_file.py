@@ -17,8 +17,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from clamp3d.errors import InputError, missing
-from clamp3d.files.bodies import Reading
-from clamp3d.files.placing import MOST_BODIES, Placer
+from clamp3d.files.bodies import MOST_BODIES, Reading
+from clamp3d.files.placing import Placer
 from clamp3d.geometry.mesh import Array
 
 try:
@@ -49,7 +49,7 @@ def read_3mf(path: Path, _: str | None) -> Reading:
         for obj, place in _meshes(item.GetObjectResource(), T):
             placer.place(obj.GetName() or path.stem, obj.GetResourceID(), partial(_arrays, obj), place)
     placer.missing += sorted(f"{text} (lib3mf)" for text in warnings if not _HARMLESS.search(text))
-    return placer.reading()
+    return placer
 
 
 def _check_count(path: Path) -> None:

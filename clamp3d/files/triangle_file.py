@@ -31,7 +31,7 @@ def read_triangles(path: Path, unit: str | None) -> Reading:
         kind = path.suffix[1:].upper()
         note = f"{kind} carries no unit: taken as mm (largest extent {size:.6g} mm{metres})"
         mesh = replace(mesh, notes=(note, *mesh.notes))
-    return Reading((Body(path.stem, MeshShape(mesh, "off", path.name), np.eye(4)),), notes=mesh.notes)
+    return Reading([Body(path.stem, MeshShape(mesh, "off", path.name), np.eye(4))], notes=[*mesh.notes])
 
 
 def _arrays(path: Path) -> tuple[Array, IntArray]:

@@ -61,7 +61,8 @@ def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
             placer.place(link.name, file, partial(_triangles, path, file, placer.notes), T)
     if not all(link.collisions for link in robot.robot.links if link.visuals):
         placer.notes.append("links without collision shapes are taken by their visual ones")
-    return placer.reading((joint.parent, joint.child) for joint in robot.robot.joints)
+    placer.joined = [(joint.parent, joint.child) for joint in robot.robot.joints]
+    return placer
 
 
 def _triangles(robot: Path, file: str, notes: list[str]) -> tuple[Array, IntArray]:

@@ -36,6 +36,17 @@ def process() -> Worker:
     return worker
 
 
+def _forget() -> None:
+    """In a forked process: the worker stays with the process that started it."""
+    if process.cache_info().currsize:
+        atexit.unregister(process().close)
+        process.cache_clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)
+
+
 def read_in_process(path: Path, option: Any = None) -> Reading:
     """The bodies of a file, read in the process; ``option`` is its unit, or the joints of a robot.
 

@@ -12,7 +12,7 @@ import numpy as np
 from clamp3d import checks
 from clamp3d.checks import function, instance
 from clamp3d.files.bodies import Body, Reading
-from clamp3d.files.mesh_file import load_bodies, load_mesh
+from clamp3d.files.formats import load_bodies
 from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
@@ -102,15 +102,16 @@ def fit_file(
         For STEP without the extra ``step``.
     """
     file = checks.path("path", path)
-    if file.suffix.lower() in (".step", ".stp"):
-        mesh, surfaces, notes = cad_features(load_bodies(file, unit=unit), file.name)
+    reading = load_bodies(file, unit=unit)
+    if isinstance(reading.bodies[0].shape, BrepSolid):
+        mesh, surfaces, notes = cad_features(reading, file.name)
         return _result(mesh, surfaces, mesh.vertices[mesh.faces], notes)
-    return fit_mesh(load_mesh(path, unit=unit), progress=progress)
+    return fit_mesh(reading.merged(file.name), progress=progress)
 
 
 def fit_solid(solid: BrepSolid) -> FitResult:
     """The cylindrical faces of a solid from CAD, with its own mesh."""
-    mesh, features, notes = cad_features(Reading((Body(solid.name, solid, np.eye(4)),)), solid.name)
+    mesh, features, notes = cad_features(Reading([Body(solid.name, solid, np.eye(4))]), solid.name)
     return _result(mesh, features, mesh.vertices[mesh.faces], notes)
 
 

@@ -1,25 +1,21 @@
-"""Files in TOML: a validated `Scene` or clamp comes out; every fault is one line with file, key, value and rule.
+"""Scene files in TOML: a validated `Scene` comes out; every fault is one line with file, key, value and rule.
 
 Lengths in mm, angles in degrees (keys that end in ``_deg``). See the package's documentation for every key.
 """
 
 from __future__ import annotations
 
-import os
-from dataclasses import fields
 from pathlib import Path
 
 import msgspec
 
 from clamp3d import checks
-from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
+from clamp3d.clamp.loader import parse_toml, read_text
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import Clamp3dError, InputError, escaped
-from clamp3d.files.formats import FORMATS, ROBOT
 from clamp3d.geometry import shapes
-from clamp3d.scenefile.parts import Reader, prefixed
+from clamp3d.scenefile.parts import prefixed
 from clamp3d.scenefile.pose_table import Pose
 from clamp3d.scenefile.tables import ClampTable, FileTable, SceneTable, clamp_source, part_table
 from clamp3d.validation import validate
@@ -94,41 +90,3 @@ def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
     scene = assemble(clamp_source(table.name, folder), line=table.line, jumper=table.jumper).scene
     T = table.pose.T()
     return scene.moved({part.name: T @ part.T_world for part in scene.parts})
-
-
-def load_described(path: Path, reader: Reader) -> Clamp | Scene:
-    """A clamp by the name or the file ``path``, with the ``reader``'s wires, or the scene in a file."""
-    reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
-    if str(path) in builtin_clamps() or _is_clamp(path):
-        return load_clamp(path, line=reader.line, jumper=reader.jumper)
-    reader.refuse(checks.short(path), "line", "jumper")
-    scene = load_scene(path)
-    if not scene.parts:
-        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME], include or [clamp]")
-    return scene
-
-
-def _is_clamp(path: Path) -> bool:
-    """Whether the tables of a TOML file are those of a clamp; False: those of a scene."""
-    named_toml = path.suffix.lower() == ".toml"
-    if not named_toml and not os.path.isfile(path):
-        raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices()}")
-    try:
-        given = set(parse_toml(read_text(path), str(path)))
-    except InputError:
-        if named_toml:
-            raise
-        raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
-    of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.__struct_fields__}
-    as_clamp, as_scene = len(given & of_clamp - of_scene), len(given & of_scene - of_clamp)
-    if not as_clamp and not as_scene:
-        raise InputError(
-            f"{checks.short(path)}: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp], ...)"
-        )
-    return as_clamp > as_scene
-
-
-def _choices() -> str:
-    built_in = ", ".join(builtin_clamps())
-    files = ", ".join((*FORMATS, ROBOT))
-    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
 
 from clamp3d import checks
+from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.loader import builtin_clamps, load_clamp, parse_toml, read_text
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import part_name
 from clamp3d.files.formats import FORMATS, ROBOT
+from clamp3d.files.objects import read_object
 from clamp3d.geometry.shapes import Fit
+from clamp3d.scenefile.file import load_scene
 from clamp3d.scenefile.parts import Reader, read_parts, to_parts
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.dimensions import Clamp
+from clamp3d.scenefile.tables import SceneTable
 
 
 def load(
@@ -80,30 +83,54 @@ def load(
         line=line,
         jumper=jumper,
     )
-    return _load_path(source, reader) if isinstance(source, (str, os.PathLike)) else _load_object(source, reader)
-
-
-def _load_path(source: str | os.PathLike[str], reader: Reader) -> Clamp | Scene:
-    from clamp3d.clamp.loader import builtin_clamps
-    from clamp3d.scenefile.file import load_described
-
-    path = checks.path("source", source)
-    if not os.fspath(source):  # else it would be the folder that one is in
-        raise InputError("source must not be empty")
-    if os.path.isdir(path) and str(path) not in builtin_clamps():
-        return _named(read_parts(path, reader), path.resolve().name)
-    if path.suffix.lower() in (*FORMATS, ROBOT):
-        return _named(read_parts(path, reader), path.stem)
-    return load_described(path, reader)
-
-
-def _load_object(source: Any, reader: Reader) -> Scene:
-    from clamp3d.files.objects import read_object
-
-    reader.refuse("an object", "joints", "poses", "unit", "line", "jumper")
-    reading, name = read_object(source)
-    return _named(to_parts(reading.complete(name, partial=reader.partial), reader), name)
-
-
-def _named(scene: Scene, name: str) -> Scene:
+    if isinstance(source, (str, os.PathLike)):
+        path = checks.path("source", source)
+        if not os.fspath(source):  # else it would be the folder that one is in
+            raise InputError("source must not be empty")
+        is_folder = os.path.isdir(path) and str(path) not in builtin_clamps()
+        if not is_folder and path.suffix.lower() not in (*FORMATS, ROBOT):
+            return _described(path, reader)
+        scene, name = read_parts(path, reader), path.resolve().name if is_folder else path.stem
+    else:
+        reader.refuse("an object", "joints", "poses", "unit", "line", "jumper")
+        reading, name = read_object(source)
+        scene = to_parts(reading.complete(name, partial=reader.partial), reader)
     return replace(scene, name=part_name(name))
+
+
+def _described(path: Path, reader: Reader) -> Clamp | Scene:
+    """A clamp by the name or the file ``path``, with the ``reader``'s wires, or the scene in a file."""
+    reader.refuse(checks.short(path), "unit", "fit", "chord", "joints", "poses", "partial")
+    if str(path) in builtin_clamps() or _is_clamp(path):
+        return load_clamp(path, line=reader.line, jumper=reader.jumper)
+    reader.refuse(checks.short(path), "line", "jumper")
+    scene = load_scene(path)
+    if not scene.parts:
+        raise InputError(f"{checks.short(path)}: the scene has no parts; add [parts.NAME], include or [clamp]")
+    return scene
+
+
+def _is_clamp(path: Path) -> bool:
+    """Whether the tables of a TOML file are those of a clamp; False: those of a scene."""
+    named_toml = path.suffix.lower() == ".toml"
+    if not named_toml and not os.path.isfile(path):
+        raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices()}")
+    try:
+        given = set(parse_toml(read_text(path), str(path)))
+    except InputError:
+        if named_toml:
+            raise
+        raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
+    of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.__struct_fields__}
+    as_clamp, as_scene = len(given & of_clamp - of_scene), len(given & of_scene - of_clamp)
+    if not as_clamp and not as_scene:
+        raise InputError(
+            f"{checks.short(path)}: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp], ...)"
+        )
+    return as_clamp > as_scene
+
+
+def _choices() -> str:
+    built_in = ", ".join(builtin_clamps())
+    files = ", ".join((*FORMATS, ROBOT))
+    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"

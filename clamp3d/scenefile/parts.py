@@ -17,8 +17,7 @@ from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Component, Reading, part_name, unique_names
-from clamp3d.files.formats import FORMATS, ROBOT
-from clamp3d.files.mesh_file import load_bodies
+from clamp3d.files.formats import FORMATS, ROBOT, load_bodies
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import FARTHEST_OFF, FITS, Fit, Shape, Solid
@@ -136,7 +135,7 @@ def to_parts(reading: Reading, reader: Reader) -> Scene:
         allowed = [Allowed(a, b, _ANY) for names in links.values() for a, b in itertools.combinations(names, 2)]
         for parent, child in reading.joined:
             allowed += [Allowed(a, b) for a in links.get(parent, ()) for b in links.get(child, ())]
-    return Scene(tuple(parts), allowed=tuple(allowed), notes=reading.notes)
+    return Scene(tuple(parts), allowed=tuple(allowed), notes=tuple(reading.notes))
 
 
 def _fitted(shape: Shape, reader: Reader) -> Shape:

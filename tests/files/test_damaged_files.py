@@ -138,35 +138,16 @@ def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
-    n = 100_000
+    n = 20_000
     rows = "".join(f"v {k} {k % 7} {k % 11}\n" for k in range(n)) + "".join(
         f"f {k} {k + 1} {k + 2}\n" for k in range(1, n - 2)
     )
     (tmp_path / "a.obj").write_text(rows)
-    monkeypatch.setenv(LIMITS, "0.05")
-    refused(
-        tmp_path / "a.obj", r"(takes more than 0.1 GB to read|not read in \d+ s); CLAMP3D_READ_LIMITS=4 allows four"
-    )
+    monkeypatch.setenv(LIMITS, "1e-6")
+    refused(tmp_path / "a.obj", "(takes more than 0.0 GB to read|not read in 0 s); CLAMP3D_READ_LIMITS=4 allows four")
     monkeypatch.setenv(LIMITS, "lots")
     with pytest.raises(InputError, match="CLAMP3D_READ_LIMITS must be a number > 0, got 'lots'"):
         load(tmp_path / "a.obj")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
-@pytest.mark.parametrize("kind", ["stl", "ply", "glb", "urdf"])
-def test_every_format_is_read_within_limits(tmp_path, monkeypatch, kind):
-    path = tmp_path / f"a.{kind}"
-    trimesh.creation.icosphere(6).export(tmp_path / "ball.stl" if kind == "urdf" else path)
-    if kind == "urdf":
-        path.write_text(ROBOT.replace('<sphere radius="0.012"/>', '<mesh filename="ball.stl"/>'))
-    monkeypatch.setenv(LIMITS, "1e-6")
-    refused(path, "not read in 0 s; CLAMP3D_READ_LIMITS=4 allows four times|takes more than 0.0 GB")
-
-
-def test_a_file_whose_name_is_no_text_is_read(tmp_path):
-    name = os.fsdecode(b"\xff.stl")
-    (tmp_path / name).write_bytes(PIN)
-    assert [part.name for part in load(tmp_path / name).parts] == ["part"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals as Linux has them")
@@ -185,35 +166,31 @@ def test_a_reader_that_ends_by_a_signal_is_said_and_the_next_file_is_read(tmp_pa
     assert [part.name for part in load(folder).parts] == ["a", "b"]
 
 
-def outside_gltf(folder, uri):
-    data = {
-        "asset": {"version": "2.0"},
-        "buffers": [{"uri": uri, "byteLength": 36}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "nodes": [{"mesh": 0}],
-    }
-    (folder / "a.gltf").write_text(json.dumps(data))
-    return folder / "a.gltf"
-
-
 def test_a_gltf_reads_nothing_outside_of_its_folder(tmp_path, monkeypatch):
-    (tmp_path / "secret.bin").write_bytes(b"secret" * 9)
-    folder = tmp_path / "cell"
-    folder.mkdir()
-    for uri in ("../secret.bin", str(tmp_path / "secret.bin"), "%2e%2e/secret.bin", "http://127.0.0.1:9/x.bin"):
-        path = outside_gltf(folder, uri)
-        with pytest.raises(InputError, match=r"outside of its folder|No such file") as caught:
-            load(path)
-        assert "secretsecret" not in str(caught.value)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
-    (tmp_path / "secret.bin").write_bytes(corners)
+    path = tmp_path / "cell" / "a.gltf"
+    path.parent.mkdir()
+    for file in (tmp_path / "secret.bin", path.parent / "own file.bin"):
+        file.write_bytes(corners)
+
+    def triangles(uri):
+        data = {
+            "asset": {"version": "2.0"},
+            "buffers": [{"uri": uri, "byteLength": 36}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "nodes": [{"mesh": 0}],
+        }
+        path.write_text(json.dumps(data))
+        return len(load(path).parts[0].shape.mesh.faces)
+
+    for uri in ("../secret.bin", str(tmp_path / "secret.bin"), "%2e%2e/secret.bin", "http://127.0.0.1:9/x.bin"):
+        with pytest.raises(InputError, match=r"outside of its folder|No such file"):
+            triangles(uri)
+    assert triangles("own%20file.bin") == 1
     monkeypatch.setenv(OUTSIDE, "1")
-    assert len(load(outside_gltf(folder, "../secret.bin")).parts[0].shape.mesh.faces) == 1
-    monkeypatch.delenv(OUTSIDE)
-    (folder / "own file.bin").write_bytes(corners)
-    assert len(load(outside_gltf(folder, "own%20file.bin")).parts) == 1
+    assert triangles("../secret.bin") == 1
 
 
 ROBOT = """<robot name="arm">
@@ -279,38 +256,21 @@ def test_pipes_and_devices_are_no_files(tmp_path, suffix):
             load(path)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="closed and full streams as Linux has them")
-@pytest.mark.parametrize(("streams", "code"), [("2>/dev/full", 0), (">/dev/full", 2), (">&- 2>&-", 0)])
-def test_a_clean_check_says_so_whatever_becomes_of_its_streams(tmp_path, streams, code):
-    for k in range(2):
-        (tmp_path / f"{k}.stl").write_bytes(TEXT)
-    (tmp_path / "poses.csv").write_text("name,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,9,0,0,0,0,0,1\n")
-    command = f"{sys.executable} -m clamp3d check . --poses poses.csv {streams}"
-    run = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
-    assert run.returncode == code, run.stderr
-    assert "Traceback" not in run.stderr
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="limits as Linux has them")
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [(["check", "a.3mf"], 0, ""), (["export", "a.3mf", "-o", "b.glb"], 2, "cannot write b.glb: File too large")],
-)
-def test_where_nothing_can_be_written_files_are_read(tmp_path, arguments, code, said):
+def test_where_nothing_can_be_written_files_are_read(tmp_path):
     import resource
 
     two = '<item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/>'
     write_3mf(tmp_path / "a.3mf", build=two)
+    command = f"{sys.executable} -m clamp3d check a.3mf >&- 2>&-"
     run = subprocess.run(
-        [sys.executable, "-m", "clamp3d", *arguments],
+        ["sh", "-c", command],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
         cwd=tmp_path,
-        capture_output=True,
-        text=True,
         check=False,
         timeout=120,
     )
-    assert (run.returncode, run.stderr.removeprefix("clamp3d: error: ").strip()) == (code, said)
+    assert run.returncode == 0
 
 
 @pytest.mark.parametrize("key", ["a." * 50_000 + "b = 1", 'x = { "a" . ' + "b . " * 9000 + "c = 1 }"])

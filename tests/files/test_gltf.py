@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from clamp3d import InputError, load
-from clamp3d.files.mesh_file import load_bodies
+from clamp3d.files.formats import load_bodies
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -121,56 +121,39 @@ def test_quantised_numbers(tmp_path):
     assert only(tmp_path, quantised).volume == pytest.approx(6.0 / 27.0, rel=1e-3)
 
 
-def damage(what):
-    made = Gltf()
-    made.node(name="good", mesh=made.mesh(made.cube()))
-    if what == "index of a mesh":
-        made.node(name="bad", mesh=7)
-    elif what == "index of a vertex":
-        made.node(name="bad", mesh=made.mesh(made.cube(F=[[0, 1, 99]])))
-    elif what == "node":
-        made.data["scenes"] = [{"nodes": [0, 9]}]
-    elif what == "extension":
-        made.data["extensionsRequired"] = ["EXT_meshopt_compression"]
-    elif what == "circle":
-        made.node(name="bad", children=[2])
-        made.node(children=[1])
-        made.data["scenes"] = [{"nodes": [0, 1]}]
-    elif what == "turn":
-        made.node(name="bad", mesh=made.mesh(made.cube()), rotation=[0.0, 0.0, 0.0, 2.0])
-    elif what == "beyond":
-        made.node(name="bad", mesh=made.mesh(made.cube()))
-        made.data["accessors"][-1]["count"] = 10**9
-    elif what in ("zeros", "sparse", "fan"):
-        primitive = made.cube()
-        accessor = made.data["accessors"][primitive["attributes"]["POSITION"]]
-        if what == "zeros":
-            del accessor["bufferView"]
-        elif what == "sparse":
-            accessor["sparse"] = {"count": 1}
-        else:
-            primitive["mode"] = 6
-        made.node(name="bad", mesh=made.mesh(primitive))
-    return made
+def bad_cube(g, accessor=None, **primitive):
+    cube = g.cube() | primitive
+    if accessor is not None:
+        accessor(g.data["accessors"][cube["attributes"]["POSITION"]])
+    g.node(name="bad", mesh=g.mesh(cube))
 
 
 @pytest.mark.parametrize(
-    ("what", "message"),
+    ("spoil", "message"),
     [
-        ("index of a mesh", "node 1, or its mesh, is not in the file"),
-        ("index of a vertex", r"missing: bad \(face index 99 is out of range for 8 vertices\)"),
-        ("node", "node 9, or its mesh, is not in the file"),
-        ("extension", "needs EXT_meshopt_compression, which is not read"),
-        ("circle", "in the tree twice"),
-        ("turn", "rotation of a node must be a quaternion of length 1, got"),
-        ("beyond", "not a readable GLTF file"),
-        ("zeros", "sparse or empty numbers are not read"),
-        ("sparse", "sparse or empty numbers are not read"),
-        ("fan", "triangles of mode 6 are not read"),
+        (lambda g: g.node(name="bad", mesh=7), "node 1, or its mesh, is not in the file"),
+        (
+            lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 99]]))),
+            r"missing: bad \(face index 99 is out of range for 8 vertices\)",
+        ),
+        (lambda g: g.data.update(scenes=[{"nodes": [0, 9]}]), "node 9, or its mesh, is not in the file"),
+        (
+            lambda g: g.data.update(extensionsRequired=["EXT_meshopt_compression"]),
+            "needs EXT_meshopt_compression, which is not read",
+        ),
+        (lambda g: g.data.update(scenes=[{"nodes": [0, 0]}]), "in the tree twice"),
+        (lambda g: g.node(rotation=[0.0, 0.0, 0.0, 2.0]), "rotation of a node must be a quaternion of length 1, got"),
+        (lambda g: bad_cube(g, lambda accessor: accessor.update(count=10**9)), "not a readable GLTF file"),
+        (lambda g: bad_cube(g, lambda accessor: accessor.pop("bufferView")), "sparse or empty numbers are not read"),
+        (lambda g: bad_cube(g, lambda accessor: accessor.update(sparse={})), "sparse or empty numbers are not read"),
+        (lambda g: bad_cube(g, mode=6), "triangles of mode 6 are not read"),
     ],
 )
-def test_what_is_not_whole_is_refused(tmp_path, what, message):
-    path = damage(what).write(tmp_path / "a.gltf")
+def test_what_is_not_whole_is_refused(tmp_path, spoil, message):
+    made = Gltf()
+    made.node(name="good", mesh=made.mesh(made.cube()))
+    spoil(made)
+    path = made.write(tmp_path / "a.gltf")
     with pytest.raises(InputError, match=message) as caught:
         load(path)
     assert "\n" not in str(caught.value)

@@ -17,16 +17,16 @@ from OCP.TopoDS import TopoDS_Compound
 from step_scenes import nested, pin, plate, pose
 
 from clamp3d import InputError, export, load
-from clamp3d.files.mesh_file import load_bodies
+from clamp3d.files.formats import load_bodies
 from clamp3d.files.open_cascade import explore
 from clamp3d.geometry.shells import volume
 from tests.cad import Tree, location
 
 
-@pytest.fixture(scope="module", params=["MM", "INCH"])
-def written(request, tmp_path_factory):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
     tree, truth = nested(np.random.default_rng(7))
-    return load(tree.write(tmp_path_factory.mktemp("step") / "machine.step", request.param)), truth
+    return load(tree.write(tmp_path_factory.mktemp("step") / "machine.step", "INCH")), truth
 
 
 def test_names_places_and_volumes_of_a_tree(written):
@@ -66,27 +66,17 @@ def test_several_solids_of_one_product_are_several_parts(tmp_path):
     assert [part.name for part in scene.parts] == ["welded_1", "welded_2"]
 
 
-def test_what_has_no_name_is_called_after_what_holds_it(tmp_path):
+def test_what_has_no_name_is_called_after_what_holds_it_and_names_need_not_be_utf8(tmp_path):
     tree = Tree()
     root, blank = tree.product("top"), tree.product(" ", pin())
     tree.put(root, blank, np.eye(4), name="=>[0:1:1:2]")  # as Open CASCADE names an instance that nobody named
     tree.put(root, tree.product("lid", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
-    assert [part.name for part in load(tree.write(tmp_path / "blank.step")).parts] == ["top", "lid"]
+    path = tree.write(tmp_path / "blank.step")
+    path.write_bytes(path.read_bytes().replace(b"PRODUCT('lid'", "PRODUCT('Bügel'".encode("latin-1")))
+    assert [part.name for part in load(path).parts] == ["top", "Bügel"]
 
 
-def test_curves_are_left_out_and_said(tmp_path):
-    tree = Tree()
-    root = tree.product("top")
-    tree.put(root, tree.product("pin", pin()), np.eye(4))
-    for k in range(2):
-        line = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, k), gp_Pnt(5, 0, k)).Edge()
-        tree.put(root, tree.product(f"axis {k}", line), np.eye(4))
-    scene = load(tree.write(tmp_path / "axis.step"))
-    assert [part.name for part in scene.parts] == ["pin"]
-    assert scene.notes == ("products that hold curves or points only are left out: 2",)
-
-
-def test_a_shell_is_refused_by_name_and_counted_on_request(tmp_path):
+def test_a_shell_is_refused_by_name_and_curves_are_left_out(tmp_path):
     sewing = BRepBuilderAPI_Sewing()
     for face in [*explore(BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape(), "FACE")][:5]:  # a box without its top
         sewing.Add(face)
@@ -95,21 +85,23 @@ def test_a_shell_is_refused_by_name_and_counted_on_request(tmp_path):
     root = tree.product("top")
     tree.put(root, tree.product("pin", pin()), np.eye(4))
     tree.put(root, tree.product("lid", sewing.SewedShape()), np.eye(4))
+    tree.put(root, tree.product("axis", BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(5, 0, 0)).Edge()), np.eye(4))
     path = tree.write(tmp_path / "shell.step")
     with pytest.raises(InputError, match=r"only 1 of 2 bodies read; missing: lid \(a surface, not a solid\)"):
         load(path)
     scene = load(path, partial=True)
     assert [part.name for part in scene.parts] == ["pin"]
     assert scene.notes[0].startswith("1 of 2 bodies read; missing: lid")
+    assert scene.notes[1] == "products that hold curves or points only are left out: 1"
 
 
 def test_a_line_less_is_never_a_body_less(tmp_path):
-    """Every ninth line of the file deleted in turn: the file is refused, or everything is there."""
+    """Every sixteenth line of the file deleted in turn: the file is refused, or everything is there."""
     tree, truth = nested(np.random.default_rng(7))
     lines = tree.write(tmp_path / "machine.step").read_text().splitlines(keepends=True)
     first = next(k for k, line in enumerate(lines) if line.startswith("DATA"))
     refused = 0
-    for k in range(first + 1, len(lines), 9):
+    for k in range(first + 1, len(lines), 16):
         damaged = tmp_path / f"{k}.step"
         damaged.write_text("".join(lines[:k] + lines[k + 1 :]))
         try:
@@ -118,15 +110,7 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
             refused += 1
             continue
         assert sizes == pytest.approx(sorted(size for _, size, _ in truth), rel=1e-3), lines[k]
-    assert refused > 60
-
-
-def test_a_name_that_is_not_utf8_is_read(tmp_path):
-    tree = Tree()
-    tree.put(tree.product("top"), tree.product("PARTNAME", plate()), np.eye(4))
-    path = tree.write(tmp_path / "a.step")
-    path.write_bytes(path.read_bytes().replace(b"PARTNAME", "Bügel".encode("latin-1")))
-    assert [part.name for part in load(path).parts] == ["Bügel"]
+    assert refused > 30
 
 
 @pytest.mark.parametrize(

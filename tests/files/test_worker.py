@@ -9,6 +9,7 @@ import pytest
 
 from clamp3d.errors import InputError, SolverError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
+from clamp3d.files.worker import process
 
 STAND_IN = """
 import os
@@ -50,15 +51,15 @@ def test_one_process_answers_until_it_fails_and_the_next_call_starts_another(wor
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
 @pytest.mark.filterwarnings("ignore:This process.*fork:DeprecationWarning")
-def test_a_forked_process_starts_a_worker_of_its_own(worker):
-    first = worker.call("stand_in:pid", time_limit=60.0)
+def test_a_forked_process_starts_a_worker_of_its_own():
+    first = process().call("os:getpid", time_limit=60.0)
     child = os.fork()
     if child == 0:
-        other = worker.call("stand_in:pid", time_limit=60.0)
-        worker.close()
+        other = process().call("os:getpid", time_limit=60.0)
+        process().close()
         os._exit(7 if other != first else 1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-    assert worker.call("stand_in:pid", time_limit=60.0) == first
+    assert process().call("os:getpid", time_limit=60.0) == first
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
@@ -85,11 +86,23 @@ def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
     assert not (tmp_path / "executed").exists()
 
 
-def test_it_ends_with_its_caller():
-    code = (
-        "import os, signal\nfrom clamp3d.files.child import Worker\nworker = Worker()\n"
-        "print(worker.call('os:getpid', time_limit=60.0), flush=True)\nos.kill(os.getpid(), signal.SIGKILL)"
-    )
+POOL = """
+from concurrent.futures import ProcessPoolExecutor
+from clamp3d.files.child import end_with_parent
+with_parent = ProcessPoolExecutor(1, initializer=end_with_parent)
+print(with_parent.submit(os.getpid).result(), flush=True)
+"""
+WORKER = """
+from clamp3d.files.child import Worker
+worker = Worker()
+print(worker.call("os:getpid", time_limit=60.0), flush=True)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
+@pytest.mark.parametrize("start", [POOL, WORKER], ids=["pool", "worker"])
+def test_it_ends_with_its_caller(start):
+    code = f"import os, signal\n{start}\nos.kill(os.getpid(), signal.SIGKILL)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
     child = int(run.stdout)
     for _ in range(600):
