@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import networkx
 import numpy as np
 import trimesh
 
@@ -30,6 +29,7 @@ from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.geometry.shapes import MeshShape, Shape, box, cylinder
 
 try:
+    import networkx  # which yourdfpy needs
     import yourdfpy
 except ImportError:
     raise missing("yourdfpy", "URDF") from None

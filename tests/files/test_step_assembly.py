@@ -70,9 +70,9 @@ def test_what_has_no_name_is_called_after_what_holds_it_and_names_need_not_be_ut
     tree = Tree()
     root, blank = tree.product("top"), tree.product(" ", pin())
     tree.put(root, blank, np.eye(4), name="=>[0:1:1:2]")  # as Open CASCADE names an instance that nobody named
-    tree.put(root, tree.product("lid", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
+    tree.put(root, tree.product("PARTNAME", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
     path = tree.write(tmp_path / "blank.step")
-    path.write_bytes(path.read_bytes().replace(b"PRODUCT('lid'", "PRODUCT('Bügel'".encode("latin-1")))
+    path.write_bytes(path.read_bytes().replace(b"PARTNAME", "Bügel".encode("latin-1")))
     assert [part.name for part in load(path).parts] == ["top", "Bügel"]
 
 
