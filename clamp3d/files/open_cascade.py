@@ -19,10 +19,8 @@ class _OpenCascade:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        require_open_cascade()
-        import OCP
-
-        setattr(self, name, getattr(getattr(OCP, name.partition("_")[0]), name))  # gp_Pnt is in the module gp
+        module = getattr(require_open_cascade(), name.partition("_")[0])  # gp_Pnt is in the module gp
+        setattr(self, name, getattr(module, name))
         return vars(self)[name]
 
 
@@ -30,15 +28,16 @@ occ: Any = _OpenCascade()
 """`occ.gp_Pnt` and all others. Raises MissingLibraryError if Open CASCADE is not installed."""
 
 
-def require_open_cascade() -> None:
-    """Load Open CASCADE and keep it from printing on stdout. Raises MissingLibraryError if it is not installed."""
+def require_open_cascade() -> Any:
+    """Open CASCADE, kept from printing on stdout. Raises MissingLibraryError if it is not installed."""
     try:
-        from OCP.Message import Message
+        import OCP
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
-    messenger = Message.DefaultMessenger_s()
+    messenger = OCP.Message.Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
+    return OCP
 
 
 def to_bytes(shape: Any) -> bytes:
