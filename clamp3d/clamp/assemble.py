@@ -12,30 +12,21 @@ from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import open_start
-from clamp3d.clamp.contact import Contact
+from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.follow import follow
 from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
-from clamp3d.clamp.meetings import meetings
+from clamp3d.clamp.path import Log, meetings
+from clamp3d.clamp.play import Closing, Meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import HELD, B, D, S, Section, W
-from clamp3d.clamp.sequence import Step, as_published, parse_sequence
+from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
-from clamp3d.clamp.steps import (
-    Closing,
-    Log,
-    Meetings,
-    approach_line,
-    close_splints,
-    insert_jumper,
-    tighten_nut,
-)
 from clamp3d.errors import InputError, SolverError
 
 STEP = 1.0 / 3.0
@@ -157,9 +148,9 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
     log = Log(section, settings.on_waypoint)
     closing, final = _close(section, settings)
-    travel = _play(section, steps, closing, settings, log)
+    travel = play(steps, closing, log)
     poses = section.poses(final.q)
-    contacts = log.contacts(poses)
+    contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     _add_silent_contacts(log, steps, closing, contacts, settings.resolution)
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
     q, proven = closing.start, final if isinstance(final, FinalState) else None
@@ -190,33 +181,22 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
 
 def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState | SteppedState]:
     """Close the clamp: the states on the way, and the last one."""
-    start = open_start(section, open_by=settings.open_by, open_tilt=settings.open_tilt)
-    met: Meetings = []
+    opened = section.open_state(section.open_distance() + settings.open_by, settings.open_tilt)
+    start = open_start(section, opened)
     if settings.solver == "exact":
+        met: Meetings = []
         final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
         met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
         by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
         taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-        return Closing(start, final.held, final.q, by_hand, taken), final
+        return Closing(opened, start, final.held, final.q, by_hand, taken), final
     moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
     stepped = (
         solve_stepped(section, **moves)
         if settings.solver == "stepped"
         else solve_bisection(section, resolution=RESOLUTION, **moves)
     )
-    return Closing(start, stepped.q, stepped.q, [], []), stepped
-
-
-def _play(section: Section, steps: tuple[Step, ...], closing: Closing, settings: _Settings, log: Log) -> float:
-    """Play the steps of the sequence; returns the way that the nut has gone when it is tight, mm."""
-    if not as_published(steps):
-        return follow(section, steps, closing, log)
-    line, jumper, close, tighten = (step.name for step in steps)
-    opened = section.open_state(section.open_distance() + settings.open_by, settings.open_tilt)
-    approach_line(section, opened, closing.start, line, log)
-    insert_jumper(section, opened, closing.start, jumper, log)
-    close_splints(section, closing.start, closing.held, closing.by_hand, close, log)
-    return tighten_nut(section, closing, tighten, log)
+    return Closing(opened, start, stepped.q, stepped.q, [], []), stepped
 
 
 def _add_silent_contacts(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, nnls
 
 from clamp3d.clamp.matrix import Pair
-from clamp3d.clamp.section import SIZE, WIRES, D, Gaps, Section
+from clamp3d.clamp.section import SIZE, D, Gaps, Section
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array
 
@@ -46,18 +46,13 @@ _NONE = 1e-12
 """What is left of a distance of 1 where there is no step."""
 
 
-def open_start(section: Section, *, open_by: float = 0.0, open_tilt: float = 0.0) -> Array:
+def open_start(section: Section, opened: Array | None = None) -> Array:
     """Where every closing begins: the clamp wide open, the up splint resting on the line, the jumper in its groove.
 
-    Parameters
-    ----------
-    section : Section
-    open_by, open_tilt : float
-        How much further than needed the clamp is open, and how its down splint is tilted; mm and rad.
+    ``opened`` (10,) is how the clamp comes in, `Section.open_state` at `Section.open_distance` by default.
     """
-    q = section.seated(section.open_state(section.open_distance() + open_by, open_tilt))
-    for i in range(len(WIRES)):
-        y = 2 * i + 1
+    q = section.seated(section.open_state(section.open_distance()) if opened is None else opened)
+    for y in (1, 3):
         q = descend(section, q, np.eye(SIZE)[y], free=(y,))
     return q
 

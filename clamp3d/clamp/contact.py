@@ -85,7 +85,7 @@ class Contact:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         data = plain(self)
-        distance: dict[str, Any] = data.pop("distance").to_dict()
+        distance: dict[str, Any] = data.pop("distance")
         return data | {"point": distance["point_a"]} | distance
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import Section
 from clamp3d.geometry.pose import Array
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.final_state import FinalState
 
 HELD = "held on the bolt's axis"
 """What carries the sideways force that frictionless contacts leave, where the joints are said to have no play."""

@@ -102,13 +102,7 @@ class End:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        data = plain(self, distance="distance_mm", tilt="tilt_deg")
-        weakest = None if self.weakest is None else plain(self.weakest)
-        return data | {
-            "tilt_deg": math.degrees(self.tilt),
-            "forces": [force.to_dict() for force in self.forces],
-            "weakest": weakest,
-        }
+        return plain(self, distance="distance_mm", tilt="tilt_deg")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +118,7 @@ class Band:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {"friction": self.friction, "least": self.least.to_dict(), "greatest": self.greatest.to_dict()}
+        return plain(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from scipy.special import ellipe, ellipk
-
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import (
     TITLES,
@@ -155,6 +153,8 @@ def _disk_under_arch(a: float, radius: float) -> float:
     It is 4 a^2 R times the integral of cos^2 t sqrt(1 - m sin^2 t) from 0 to pi/2 with m = (a / R)^2, which complete
     elliptic integrals of that parameter give as ((1 + m) E - (1 - m) K) / (3 m).
     """
+    from scipy.special import ellipe, ellipk  # takes long to import, and most scenes need none of it
+
     m = (a / radius) ** 2
     K, E = float(ellipk(m)), float(ellipe(m))
     return 4.0 * a * a * radius * ((1.0 + m) * E - (1.0 - m) * K) / (3.0 * m)

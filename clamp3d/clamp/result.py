@@ -74,8 +74,7 @@ class Start:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        data = plain(self, closing="closing_mm", tilt="tilt_deg")
-        return data | {"tilt_deg": math.degrees(self.tilt)}
+        return plain(self, closing="closing_mm", tilt="tilt_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +119,7 @@ class Equilibrium:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        data = plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
-        return data | {"tilt_deg": math.degrees(self.tilt)}
+        return plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.contact import measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.matrix import PAIRS, Pair
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.section import EDGE, EDGES, SPLINTS, WIRES, D, Gaps, Section
@@ -22,6 +21,9 @@ from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.check import check
 from clamp3d.engine.result import NOT_CLEAN
 from clamp3d.geometry.pose import Array
+
+if TYPE_CHECKING:
+    from clamp3d.clamp.final_state import FinalState
 
 CLAMPED = "clamped"
 _KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))
@@ -155,12 +157,12 @@ def _not_held(section: Section, final: FinalState | SteppedState, places: tuple[
     slipped = section.escaped(final.q)
     if slipped:
         return f"{' and '.join(slipped)} slips out of its groove"
-    if isinstance(final, FinalState):
-        stops, loose = set(final.active), set(final.loose)
-    else:
+    if isinstance(final, SteppedState):
         named = zip(final.gaps.pair, final.gaps.feature, final.gaps.value, strict=True)
         stops = {(pair, feature) for pair, feature, gap in named if gap <= resolution}
         loose = {wire for wire in WIRES if not all(seat.touches for seat in places if seat.wire == wire)}
+    else:
+        stops, loose = set(final.active), set(final.loose)
     if loose:
         reasons = stop_words(stops)
         if not reasons:  # a wire on four lips holds both splints, whatever they do to the other one

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -127,20 +128,6 @@ def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = Fal
     return new
 
 
-def _remembered(function: Callable[[Array], Gaps]) -> Callable[[Array], Gaps]:
-    """The function with its last answer kept: solvers ask for values and derivatives one after the other."""
-    last: dict[bytes, Gaps] = {}
-
-    def gaps(x: Array) -> Gaps:
-        key = x.tobytes()
-        if key not in last:
-            last.clear()
-            last[key] = function(x)
-        return last[key]
-
-    return gaps
-
-
 class _FreeError(Exception):
     """Found a free place: no need to look for a better one."""
 
@@ -155,29 +142,28 @@ def _settle(section: Section, q: Array, wire: PartName, widest: bool) -> bool:
     top = float(up[1]) - section.pairs["P1", wire].groove.radius
     bottom = float(down[1]) + section.pairs["P2", wire].groove.radius
 
-    def at(xy: Array) -> Gaps:
-        q[i : i + 2] = xy
-        found = section.wire_gaps(q, wire)
-        if not widest and found.value.min() >= -FREE:
+    @lru_cache(maxsize=1)  # the optimiser asks for values and derivatives one after the other
+    def gaps(x: float, y: float) -> Gaps:
+        q[i : i + 2] = x, y
+        rows = section.wire_gaps(q, wire)
+        if not widest and rows.value.min() >= -FREE:
             raise _FreeError
-        return found
-
-    gaps = _remembered(at)
+        return rows
 
     def slack_gradient(x: Array) -> Array:
-        found = gaps(x[:2]).gradient[:, i : i + 2]
-        return np.column_stack([found, -np.ones(len(found))])
+        gradient = gaps(x[0], x[1]).gradient[:, i : i + 2]
+        return np.column_stack([gradient, -np.ones(len(gradient))])
 
     try:
-        found = minimize(
+        end = minimize(
             lambda x: -x[2],
-            np.array([*q[i : i + 2], gaps(q[i : i + 2]).value.min()]),
+            np.array([*q[i : i + 2], gaps(q[i], q[i + 1]).value.min()]),
             jac=lambda x: np.array([0.0, 0.0, -1.0]),
             bounds=[section.mouth(wire), (top, bottom), (None, None)],
-            constraints={"type": "ineq", "fun": lambda x: gaps(x[:2]).value - x[2], "jac": slack_gradient},
+            constraints={"type": "ineq", "fun": lambda x: gaps(x[0], x[1]).value - x[2], "jac": slack_gradient},
             method="SLSQP",
             options={"maxiter": 60, "ftol": 1e-12},
         ).x
-        return bool(gaps(found[:2]).value.min() >= -FREE)
+        return bool(gaps(end[0], end[1]).value.min() >= -FREE)
     except _FreeError:
         return True

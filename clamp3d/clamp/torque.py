@@ -10,13 +10,14 @@ every answer is a range over it. Forces in the contacts are those of the frictio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from clamp3d.checks import number
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.forces import HELD, Force
+from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import WIRES
 from clamp3d.errors import InputError
 
@@ -44,16 +45,15 @@ class Coefficient:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
+class Range(NamedTuple):
     """From ``low`` to ``high``, in the unit that the owner says."""
 
     low: float
     high: float
 
-    def __mul__(self, factor: float) -> Range:
-        """Both ends times a factor > 0."""
-        return Range(self.low * factor, self.high * factor)
+    def times(self, low: float, high: float) -> Range:
+        """The least end times ``low``, the greatest times ``high``; both > 0."""
+        return Range(self.low * low, self.high * high)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class ContactLoad:
     @property
     def line_load(self) -> Range | None:
         """Force per mm of a wire, N/mm. Strands are no solid bar: this is not a Hertz pressure."""
-        return None if self.length is None else self.newton * (1.0 / self.length)
+        return None if self.length is None else self.newton.times(1.0 / self.length, 1.0 / self.length)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +127,13 @@ class Tightening:
             "torque_nm": self.torque,
             "preloads": [{"friction": mu, "preload_n": newton} for mu, newton in self.preloads],
             "contacts": [
-                {"a": load.force.a, "b": load.force.b, "feature": load.force.feature, "force_n": _ends(load.newton)}
-                | ({} if load.line_load is None else {"line_load_n_per_mm": _ends(load.line_load)})
+                {"a": load.force.a, "b": load.force.b, "feature": load.force.feature, "force_n": list(load.newton)}
+                | ({} if load.line_load is None else {"line_load_n_per_mm": list(load.line_load)})
                 for load in self.contacts
             ],
-            "slip_n": {wire: _ends(pull) for wire, pull in self.slip.items()},
-            "limits": [{"limit": limit.limit, "torque_nm": _ends(limit.torque)} for limit in self.limits],
-            "coefficients": [{"name": c.name, "value": c.value, "source": c.source} for c in self.coefficients],
+            "slip_n": {wire: list(pull) for wire, pull in self.slip.items()},
+            "limits": [plain(limit, torque="torque_nm") for limit in self.limits],
+            "coefficients": [plain(coefficient) for coefficient in self.coefficients],
         }
 
 
@@ -187,14 +187,13 @@ def tighten(
         raise InputError(f"torque: needs a clamp that the exact solver has closed, got {assembly.status!r}")
     clamp = assembly.clamp
     preloads = tuple((mu, 1e3 * torque / torque_per_newton(clamp, mu)) for mu in thread)
-    bare = Tightening(torque, preloads, (), {}, (), _sources(clamp, thread, groove))
-    contacts = tuple(_load(clamp, force, bare.preload) for force in assembly.forces if force.feature != HELD)
+    preload = Range(preloads[-1][1], preloads[0][1])
+    contacts = tuple(_load(clamp, force, preload) for force in assembly.forces if force.feature != HELD)
     held = {wire: sum(load.force.force for load in contacts if wire == load.force.b) for wire in WIRES}
-    slip = {
-        wire: Range(bare.preload.low * groove[0] * share, bare.preload.high * groove[-1] * share)
-        for wire, share in held.items()
-    }
-    return replace(bare, contacts=contacts, slip=slip, limits=_limits(clamp, contacts, held, (thread, groove)))
+    slip = {wire: preload.times(groove[0] * share, groove[-1] * share) for wire, share in held.items()}
+    low, high = (1e-3 * torque_per_newton(clamp, mu) for mu in (thread[0], thread[-1]))
+    limits = [Reached(text, needed.times(low, high)) for text, needed in _limits(clamp, contacts, held, groove)]
+    return Tightening(torque, preloads, contacts, slip, tuple(limits), _sources(clamp, thread, groove))
 
 
 def coefficients(name: str, values: Sequence[float]) -> tuple[float, ...]:
@@ -212,33 +211,24 @@ def _bearing_diameter(clamp: Clamp) -> float:
 
 def _load(clamp: Clamp, force: Force, preload: Range) -> ContactLoad:
     length = {"P1": clamp.up_splint.length, "P2": clamp.down_splint.length}.get(force.a)
-    return ContactLoad(force, preload * force.force, length if force.b in WIRES else None)
+    return ContactLoad(force, preload.times(force.force, force.force), length if force.b in WIRES else None)
 
 
 def _limits(
-    clamp: Clamp,
-    contacts: Sequence[ContactLoad],
-    held: dict[PartName, float],
-    friction: tuple[tuple[float, ...], tuple[float, ...]],
-) -> tuple[Reached, ...]:
-    """The torque at which each limit of the file is reached; a least pull is reached for sure at its highest one."""
-    (thread, groove), limits, reached = friction, clamp.limits, []
-
-    def torques(text: str, weakest: float, strongest: float) -> None:
-        low, high = (1e-3 * torque_per_newton(clamp, mu) for mu in (thread[0], thread[-1]))
-        reached.append(Reached(text, Range(low * weakest, high * strongest)))
-
+    clamp: Clamp, contacts: Sequence[ContactLoad], held: dict[PartName, float], groove: Sequence[float]
+) -> Iterator[tuple[str, Range]]:
+    """Each limit of the file, and the preload in N at which it is reached: with the highest friction and the lowest."""
+    limits = clamp.limits
     if (most := limits.bolt_force) is not None:
-        torques(f"bolt force {most:g} N", most, most)
+        yield f"bolt force {most:g} N", Range(most, most)
     if (line_load := limits.line_load) is not None:
         for load in contacts:
             if load.length is not None:
                 preload = line_load * load.length / load.force.force
-                torques(f"line load {line_load:g} N/mm at {load.force.a}-{load.force.b}", preload, preload)
+                yield f"line load {line_load:g} N/mm at {load.force.a}-{load.force.b}", Range(preload, preload)
     if (pull := limits.wire_pull) is not None:
         for wire, share in held.items():
-            torques(f"{wire} holds a pull of {pull:g} N", pull / (groove[-1] * share), pull / (groove[0] * share))
-    return tuple(reached)
+            yield f"{wire} holds a pull of {pull:g} N", Range(pull / (groove[-1] * share), pull / (groove[0] * share))
 
 
 def _sources(clamp: Clamp, thread: Sequence[float], groove: Sequence[float]) -> tuple[Coefficient, ...]:
@@ -265,7 +255,3 @@ def check_torque(torque: float) -> float:
     if not 0.0 < torque <= 1e6:
         raise InputError(f"torque must be > 0 and at most 1e6 Nm, got {torque:g}")
     return torque
-
-
-def _ends(span: Range) -> list[float]:
-    return [span.low, span.high]

@@ -161,7 +161,7 @@ class DrawnModel(Model):
         self._outer: dict[float, Surface] = {}
         self._inner: dict[float, Surface | None] = {}
 
-    @property
+    @cached_property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of the part's box, mm."""
         return self.shape.bounds

@@ -15,7 +15,7 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
-from clamp3d.clamp.ways import Ways
+from clamp3d.clamp.ways import Insertion
 from clamp3d.errors import SequenceError
 from clamp3d.geometry.meshing import mesh
 from clamp3d.output.report import make_report
@@ -134,7 +134,7 @@ def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_f
     place = {name: pose.T() for name, pose in section.poses(open_start(section)).items()}
     groove = section.pairs["P1", "P6"]
     assert abs(place["P1"][0, 3] + groove.T_a_groove[0, 3]) > 0.1  # not above the line
-    ((origin, _),) = Ways(section.clamp).find([("P1", "P6")], place)
+    ((origin, _),) = Insertion(section.clamp, [("P1", "P6")], place).way_out()
     assert origin == "from above"
 
 

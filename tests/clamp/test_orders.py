@@ -14,7 +14,8 @@ from orders import MOVING, has_way, open_bodies, possible, questions
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.ways import Ways
+from clamp3d.clamp.ways import Insertion
+from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SequenceError
 
 COUNT = int(os.environ.get("CLAMP3D_ORDERS", "4"))
@@ -31,9 +32,9 @@ def test_the_search_finds_a_way_where_there_is_one(truth):
     rng = np.random.default_rng(3)
     chosen = [list(truth)[k] for k in rng.permutation(len(truth))[:COUNT]]
     place = {name: assemble().path[4].T_world(name) for name in PARTS}
-    ways = Ways(load_clamp())
+    clamp, cache = load_clamp(), ModelCache()
     for part, others in chosen:
-        legs = ways.find([(part, other) for other in others], place)
+        legs = Insertion(clamp, [(part, other) for other in others], place, cache).way_out()
         assert bool(legs) == truth[part, others], (part, others, legs)
 
 

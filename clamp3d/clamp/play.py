@@ -1,0 +1,147 @@
+"""The steps of an assembly sequence as they are played, each ending at a contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.path import Log
+from clamp3d.clamp.plan import Plan
+from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.section import D
+from clamp3d.clamp.sequence import Step, as_published
+from clamp3d.clamp.ways import DIRECTIONS, SPARE, corners
+from clamp3d.geometry.pose import Array
+
+_SCREW: frozenset[str] = frozenset(("P4", "P5"))
+Meetings = list[tuple[Pair, Array]]
+"""Pairs of parts, each with the state (10,) in which they meet."""
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What the solver found: the states wide open, at the start, closed by hand and at the end, and the contacts on the
+    way, by hand and where the nut takes up the joints' play."""
+
+    opened: Array
+    start: Array
+    held: Array
+    end: Array
+    by_hand: Meetings
+    taken: Meetings
+
+
+def play(steps: tuple[Step, ...], closing: Closing, log: Log) -> float:
+    """Play ``steps``; returns the way that the nut has gone when it is tight, mm.
+
+    Raises SequenceError for a step that no way leads to.
+    """
+    plan, travel = None, 0.0
+    if not as_published(steps):
+        plan = _plan(steps, closing, log)
+        log.aside = plan.offsets(0)
+        log.reach(steps[0].name, "parts apart", plan.bases[0])
+    for k, step in enumerate(steps):
+        if step.kind == "close":
+            _close_splints(step.name, closing, log)
+        elif step.kind == "tighten":
+            travel = _tighten_nut(step, closing, log)
+        elif plan is not None:
+            _bring(plan, k, log)
+        elif step.part == "P7":
+            _insert_jumper(step.name, closing, log)
+        else:
+            _approach_line(step.name, closing, log)
+    return travel
+
+
+def _plan(steps: tuple[Step, ...], closing: Closing, log: Log) -> Plan:
+    section = log.section
+    start, end = section.poses(closing.start), section.poses(closing.end)
+    held = section.poses(closing.held, saddle_d=float(closing.start[D]))
+    bases = [start]
+    for step in steps:
+        bases.append({"bring": bases[-1], "close": held, "tighten": end}[step.kind])
+    return Plan(section.clamp, steps, bases, float(closing.start[D] - closing.end[D]), log.cache)
+
+
+def _bring(plan: Plan, k: int, log: Log) -> None:
+    """The parts of a step come in on their way; they end where they touch, if they do."""
+    step, legs, base, before, end = plan.steps[k], plan.legs[k], plan.bases[k], log.aside, plan.offsets(k + 1)
+    pairs, (origin, length) = plan.meeting_pairs(k), legs[0]
+    stops = [(corners(legs)[0], f"{step.part} before its place, {legs[1][0]}")] if legs[1:] else []
+    engaged = base["P5"].y + plan.clamp.nut.height - base["P4"].y
+    if any(set(pair) == _SCREW for pair in pairs) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
+        stops.append((corners([(origin, engaged)])[0], "nut on the bolt's end"))
+    for corner, label in stops:
+        log.aside = {**before, **{name: end[name] + corner for name in step.parts}}
+        log.reach(step.name, label, base)
+    log.aside = end
+    log.reach(step.name, f"{step.part} in place, {origin}", base)
+    travel = sum(length for _, length in legs)
+    log.touch(step.name, sorted((min(pair), max(pair)) for pair in pairs), base, travel, within=CONTACT)
+
+
+def _approach_line(step: str, closing: Closing, log: Log) -> None:
+    """The open clamp comes in from the right until the line lies under its groove, then settles on the line."""
+    section, opened, start = log.section, closing.opened, closing.start
+    clamp = section.clamp
+    beside, over, settled = opened.copy(), opened.copy(), opened.copy()
+    middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
+    beside[1] = over[1] = middle
+    beside[0] = -clamp.line.radius - SPARE
+    # The jumper waits clear of the clamp's way in.
+    settled[:2], settled[3] = start[:2], middle
+    settled[2] = settled[0] - beside[0] + clamp.up_splint.width + clamp.jumper.radius + SPARE
+    jumper = {"P7": section.poses(settled)["P7"]}
+    for state, label in (
+        (beside, "open clamp beside the line"),
+        (over, "line between the splints"),
+        (settled, "up splint rests on the line"),
+    ):
+        log.reach(step, label, section.poses(state) | jumper)
+    log.touch(step, [("P1", "P6")], section.poses(settled), float(opened[1] - start[1]))
+
+
+def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
+    """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
+    inside, placed = closing.start.copy(), log.section.poses(closing.start)
+    inside[3] = closing.opened[3]
+    log.reach(step, "jumper between the splints", log.section.poses(inside))
+    log.reach(step, "jumper in the up splint's groove", placed)
+    log.touch(step, [("P1", "P7")], placed, float(closing.opened[3] - closing.start[3]))
+
+
+def _close_splints(step: str, closing: Closing, log: Log) -> None:
+    """The down splint closes by hand, the saddle left where it was; what waits apart it does not meet."""
+    section, d = log.section, float(closing.start[D])
+    for pair, q in closing.by_hand:
+        if not any(np.any(log.aside.get(name, 0.0)) for name in pair):
+            poses = section.poses(q, saddle_d=d)
+            log.reach(step, f"down splint touches {pair[1]}", poses)
+            log.touch(step, [pair], section.poses(q), d - float(q[D]))
+    log.reach(step, "splints closed", section.poses(closing.held, saddle_d=d))
+
+
+def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
+    """The nut draws the saddle up to the round back, and both on to the end if the joints have play.
+
+    If the down splint has not been closed by hand, the saddle takes it along. Returns the way that the nut has gone.
+    """
+    section, d, seated, met = log.section, float(closing.start[D]), closing.held, closing.taken
+    if "P2" in step.parts:
+        seated, met = closing.end, closing.by_hand + closing.taken
+    elif not np.array_equal(seated, closing.end):
+        log.reach(step.name, "saddle meets the down splint", section.poses(seated))
+    for pair, q in met:
+        if "P2" in step.parts:
+            log.reach(step.name, f"down splint touches {pair[1]}", section.poses(q))
+        log.touch(step.name, [pair], section.poses(q), d - float(q[D]))
+    end, travel = section.poses(closing.end), d - float(closing.end[D])
+    log.reach(step.name, "nut tightened", end)
+    log.touch(step.name, [("P2", "P3")], section.poses(seated), d - float(seated[D]))
+    tight: list[Pair] = [pair for pair in (("P1", "P5"), ("P3", "P4")) if section.clamp.connection(*pair)]
+    log.touch(step.name, tight, end, travel)
+    return travel
