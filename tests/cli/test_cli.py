@@ -84,33 +84,17 @@ def test_every_file_option_writes_to_stdout_for_a_dash():
     assert [option.opts for option in files if not isinstance(option.type, Output)] == []
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("run", "--json", "-"),
-        ("tolerance", "--n", "2", "--json", "-"),
-        ("sweep", "--steps", "4", "--json", "-"),
-        ("check", "boxes.toml", "--json", "-"),
-        ("fit", "ball.stl", "--json", "-"),
-    ],
-)
-def test_json_on_stdout_is_nothing_but_json(arguments, tmp_path, monkeypatch, whole_main):
+@pytest.mark.parametrize("command", ["tolerance --n 2", "sweep --steps 4", "check boxes.toml", "fit ball.stl"])
+def test_json_on_stdout_is_nothing_but_json(command, tmp_path, monkeypatch, whole_main):
     boxes(tmp_path, 20.0)
     trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "ball.stl")
     before = sorted(tmp_path.iterdir())
     monkeypatch.chdir(tmp_path)
-    code, out, err = whole_main(*arguments)
+    code, out, err = whole_main(*command.split(), "--json", "-")
     assert code == 0, err
     assert isinstance(json.loads(out), dict)
     assert len(err.splitlines()) >= 2  # the text for people
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_a_page_on_stdout(tmp_path, whole_main):
-    code, out, _ = whole_main("check", boxes(tmp_path, 20.0), "--html", "-")
-    assert code == 0
-    assert out.lower().startswith("<!doctype html>")
-    assert out.rstrip().endswith("</html>")
 
 
 def test_only_one_file_can_be_stdout(tmp_path, whole_main):
@@ -164,15 +148,16 @@ def test_control_characters_do_not_reach_the_terminal(tmp_path, whole_main):
     assert all(c.isprintable() or c == "\n" for c in out + err)
 
 
-@pytest.mark.parametrize(("text", "value"), [("1/3", 1 / 3), ("0.25", 0.25), (" 2e-3 ", 2e-3), ("-3/2", -1.5)])
-def test_fractions(text, value):
-    assert number(text) == value
-
-
-@pytest.mark.parametrize("text", ["1/0", "x", "", "nan", "inf", "1e400", "1/2/3", "1,5", "1_0"])
-def test_anything_else_is_refused(text):
-    with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
-        number(text)
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1/3", 1 / 3), (" 2e-3 ", 2e-3), ("-3/2", -1.5), *((text, None) for text in ("1/0", "", "inf", "1,5", "1_0"))],
+)
+def test_numbers_may_be_fractions_and_nothing_else(text, value):
+    if value is not None:
+        assert number(text) == value
+    else:
+        with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
+            number(text)
 
 
 def test_a_third_of_a_millimetre_is_the_papers_step(main):

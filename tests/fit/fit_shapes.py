@@ -66,14 +66,11 @@ def scan(step, sigma, seed, *, width=40.0, length=40.0):
     return V, np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
 
 
-def surface_points(feature, *, n=15, m=7):
-    """Points of the fitted surface over its covered range, in part coordinates."""
-    t = np.linspace(-feature.half_angle, feature.half_angle, n)
-    z = np.linspace(-feature.length / 2, feature.length / 2, m)
-    t, z = (q.ravel() for q in np.meshgrid(t, z))
-    local = np.stack([feature.radius * np.sin(t), -feature.radius * np.cos(t), z], axis=1)
-    return local @ feature.T_part_feature[:3, :3].T + feature.T_part_feature[:3, 3]
-
-
-def distance_to_axis(points, point, direction):
-    return np.linalg.norm(np.cross(points - point, direction / np.linalg.norm(direction)), axis=1)
+def off_groove(feature, x, T=None):
+    """How far the fitted surface is at most, over its covered range, from the true groove at ``x`` of a part at T."""
+    T = np.eye(4) if T is None else T
+    t, z = (q.ravel() for q in np.meshgrid(np.linspace(-1, 1, 15) * feature.half_angle, np.linspace(-0.5, 0.5, 7)))
+    local = np.stack([feature.radius * np.sin(t), -feature.radius * np.cos(t), z * feature.length], axis=1)
+    points = local @ feature.T_part_feature[:3, :3].T + feature.T_part_feature[:3, 3]
+    own = (points - T[:3, 3]) @ T[:3, :3] - np.array([x, CENTRE_HEIGHT, 0.0])
+    return np.abs(np.hypot(own[:, 0], own[:, 1]) - RADIUS).max()

@@ -3,18 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from fit_shapes import (
-    CENTRE_HEIGHT,
-    CENTRES,
-    HALF,
-    LENGTH,
-    RADIUS,
-    distance_to_axis,
-    prism,
-    scan,
-    splint,
-    surface_points,
-)
+from fit_shapes import CENTRE_HEIGHT, CENTRES, HALF, LENGTH, RADIUS, off_groove, prism, scan, splint
 
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.geometry.mesh import make_mesh
@@ -41,10 +30,7 @@ def check_grooves(result, T=None, *, mirror=False, within="fit_error"):
         own = np.linalg.inv(T) @ np.append(g.T_part_feature[:3, 3], 1.0)
         k = int(np.argmin([abs(own[0] - x) for x in CENTRES]))
         seen.add(k)
-        centre = (T @ np.array([CENTRES[k], CENTRE_HEIGHT, 0.0, 1.0]))[:3]
-        axis = T[:3, :3] @ np.array([0.0, 0.0, 1.0])
-        off = distance_to_axis(surface_points(g), centre, axis) - RADIUS
-        assert np.abs(off).max() <= getattr(g, within)
+        assert off_groove(g, CENTRES[k], T) <= getattr(g, within)
         mouth = T[:3, :3] @ np.array([0.0, -1.0, 0.0])
         assert R[:, 1] @ mouth > np.cos(0.05)
         assert abs(g.half_angle - HALF) <= g.arc_error + 3e-6
@@ -92,10 +78,7 @@ def test_scan_within_three_standard_errors(step, sigma, seeds):
         tilt = g.T_part_feature[:3, :3].T @ (np.array([0.0, 0.0, 1.0]) * np.sign(d[2]))
         error = np.array([RADIUS - g.radius, at[0], at[1], tilt[0], tilt[1]])
         assert np.all(np.abs(error) <= 3.0 * np.sqrt(np.diag(g.covariance)))
-        off = (
-            distance_to_axis(surface_points(g), np.array([0.0, CENTRE_HEIGHT, 0.0]), np.array([0.0, 0.0, 1.0])) - RADIUS
-        )
-        assert np.abs(off).max() <= g.error_bound
+        assert off_groove(g, 0.0) <= g.error_bound
         assert abs(g.residual_rms / sigma - 1.0) < 0.15
         assert abs(g.half_angle - HALF) <= g.arc_error
         assert any("not closed" in note for note in result.notes)
@@ -115,11 +98,7 @@ def test_split_strips_and_cracks():
     assert len(result.grooves) == 2
     for g in result.grooves:
         k = int(np.argmin([abs(g.T_part_feature[0, 3] - x) for x in CENTRES]))
-        off = (
-            distance_to_axis(surface_points(g), np.array([CENTRES[k], CENTRE_HEIGHT, 0]), np.array([0, 0, 1.0]))
-            - RADIUS
-        )
-        assert np.abs(off).max() <= g.fit_error
+        assert off_groove(g, CENTRES[k]) <= g.fit_error
     assert any("turned" in note for note in result.notes)
 
 

@@ -49,11 +49,12 @@ def test_a_folder_of_meshes_with_poses(folder, tmp_path):
         (["bolt,1,2,0,0,0,0,1", "plate,1_0,0,0,0,0,0,1"], "line 3: translation.0: must be a valid number, got '1_0'"),
         (["bolt" * 50_000 + ",1,2,0,0,0,0,1"], "line 2: field larger than field limit"),
         ([], "no pose in the table"),
+        (None, "the first line must be name,x,y,z,qx,qy,qz,qw, got 'a,b'"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(folder, tmp_path, rows, message):
     with pytest.raises(InputError, match=message):
-        load(folder, poses=table(tmp_path / "poses.csv", *rows))
+        load(folder, poses=table(tmp_path / "poses.csv", *rows or [], **({"head": "a,b"} if rows is None else {})))
 
 
 def test_files_whose_names_no_part_can_have(folder):
@@ -75,11 +76,6 @@ def test_two_files_of_one_name_are_refused_by_name(folder):
     (folder / "bolt.obj").write_text("")
     with pytest.raises(InputError, match=r"bolt\.obj and bolt\.ply would both be part 'bolt'"):
         load(folder)
-
-
-def test_other_columns_are_refused(folder, tmp_path):
-    with pytest.raises(InputError, match="the first line must be name,x,y,z,qx,qy,qz,qw, got 'a,b'"):
-        load(folder, poses=table(tmp_path / "poses.csv", head="a,b"))
 
 
 ROBOT = """<robot name="arm">
@@ -104,6 +100,7 @@ def robot(tmp_path):
 
 
 def test_a_robot_with_joint_values(robot):
+    assert load(robot).parts[2].T_world[0, 3] == pytest.approx(10.0)  # the nearest limit
     scene = load(robot, joints={"turn": np.pi / 6, "slide": 30.0})
     assert [p.name for p in scene.parts] == ["base", "rail", "tip_1", "tip_2"]
     base, rail, ball, pin = scene.parts
@@ -120,10 +117,6 @@ def test_a_robot_with_joint_values(robot):
     found = check(scene)
     assert found.verdict("tip_1", "tip_2").value == "allowed"
     assert found.verdict("base", "tip_1").value == "clear"
-
-
-def test_joints_start_within_their_limits(robot):
-    assert load(robot).parts[2].T_world[0, 3] == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize(
@@ -144,9 +137,6 @@ def test_a_robot_without_one_of_its_meshes_is_refused(robot):
     with pytest.raises(InputError, match=r"3 of 4 bodies read; missing: rail \(.*rail.stl: no such file .*\)"):
         load(robot)
     assert [p.name for p in load(robot, partial=True).parts] == ["base", "tip_1", "tip_2"]
-    robot.write_text("<robot")
-    with pytest.raises(InputError, match="not a readable URDF file"):
-        load(robot)
 
 
 def test_a_scene_file_includes_any_of_them(folder, robot):
