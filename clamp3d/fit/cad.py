@@ -11,9 +11,10 @@ import numpy as np
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.faces import CYLINDER, KINDS, PLANE
 from clamp3d.files.solid import BrepSolid
-from clamp3d.fit.cylinder import Axis, perpendicular
+from clamp3d.fit.cylinder import Axis, frame, upward
 from clamp3d.fit.surface import covered
 from clamp3d.geometry.mesh import Array, IntArray, Mesh
+from clamp3d.geometry.pose import to_source
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one."""
@@ -31,7 +32,7 @@ def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, d
         others.update(KINDS[kind] for kind in solid.surfaces.kind if kind not in (PLANE, CYLINDER))
         for group in _groups(solid):
             rows = np.flatnonzero(np.isin(solid.face, group))
-            values = _values(_axis(body, solid, group[0]), placed[solid.mesh.faces[rows]])
+            values = _values(body, solid, group[0], placed[solid.mesh.faces[rows]])
             features.append((float(solid.surfaces.sense[group[0]]), values | {"faces": rows + m}))
         vertices.append(placed)
         faces.append(solid.mesh.faces + n)
@@ -65,32 +66,22 @@ def _continues(solid: BrepSolid, i: int, j: int) -> bool:
     return bool(faces.sense[i] == faces.sense[j] and max(off) < _SAME)
 
 
-def _axis(body: Body, solid: BrepSolid, face: int) -> Axis:
-    """The cylinder of a face where its body stands; the sense of an axis is nobody's, so it is that of a fit."""
+def _values(body: Body, solid: BrepSolid, face: int, corners: Array) -> dict[str, Any]:
+    """The values of a `FittedSurface` but its ``faces``, from the triangles (m, 3, 3) on the cylinder of a face."""
     point, *_, direction = solid.surfaces.frame[face]
-    z = body.T[:3, :3] @ direction
-    z = z if z[int(np.argmax(np.abs(z)))] > 0.0 else -z
-    return Axis(body.T[:3, :3] @ point + body.T[:3, 3], z, float(solid.surfaces.size[face, 0]))
-
-
-def _values(axis: Axis, corners: Array) -> dict[str, Any]:
-    """The values of a `FittedSurface` but its ``faces``, from the triangles (m, 3, 3) on it."""
-    u, w = perpendicular(axis.direction)
-    x, y, z = np.moveaxis((corners - axis.point) @ np.stack([u, w, axis.direction], axis=1), -1, 0)
-    angle = np.unwrap(np.arctan2(y, x), axis=1)
+    radius = float(solid.surfaces.size[face, 0])
+    axis = Axis(body.T[:3, :3] @ point + body.T[:3, 3], upward(body.T[:3, :3] @ direction), radius)
+    x, y, z = np.moveaxis(to_source(frame(axis, 0.0, 0.0), corners), -1, 0)
+    angle = np.unwrap(np.arctan2(x, -y), axis=1)
     middle, half = covered(angle, _SAME)
     low, high = float(z.min()), float(z.max())
-    T = np.eye(4)
-    T[:3, 1] = -(math.cos(middle) * u + math.sin(middle) * w)
-    T[:3, 2] = axis.direction
-    T[:3, 0] = np.cross(T[:3, 1], T[:3, 2])
-    T[:3, 3] = axis.point + 0.5 * (low + high) * axis.direction
+    T = frame(axis, middle, 0.5 * (low + high))
     across, along = angle[:, 1:] - angle[:, :1], z[:, 1:] - z[:, :1]
-    area = 0.5 * axis.radius * float(np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]).sum())
-    off = float(np.abs(np.hypot(x, y) - axis.radius).max())
-    arc_error, length_error = _strays((corners - T[:3, 3]) @ T[:3, :3], half, high - low)
+    area = 0.5 * radius * float(np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]).sum())
+    off = float(np.abs(np.hypot(x, y) - radius).max())
+    arc_error, length_error = _strays(to_source(T, corners), half, high - low)
     return {
-        "radius": axis.radius,
+        "radius": radius,
         "half_angle": half,
         "length": high - low,
         "T_part_feature": T,
@@ -98,11 +89,7 @@ def _values(axis: Axis, corners: Array) -> dict[str, Any]:
         "residual_max": off,
         "points": len(np.unique(corners.reshape(-1, 3), axis=0)),
         "covered_area": area,
-        "coverage": min(1.0, area / (2.0 * half * axis.radius * (high - low))),
-        "covariance": np.zeros((5, 5)),
-        "covariance_error": 0.0,
         "form_error": off,
-        "chord_error": 0.0,
         "arc_error": arc_error,
         "length_error": length_error,
     }

@@ -50,6 +50,24 @@ def perpendicular(direction: Array) -> tuple[Array, Array]:
     return u, np.cross(direction, u)
 
 
+def upward(direction: Array) -> Array:
+    """``direction`` (3,) or its opposite: the sense of an axis is nobody's, so its largest coordinate is positive."""
+    return direction if direction[int(np.argmax(np.abs(direction)))] > 0.0 else -direction
+
+
+def frame(axis: Axis, turn: float, height: float) -> Array:
+    """Pose (4, 4) with its origin at ``height`` mm on the axis, z along it, and -y turned by ``turn`` (rad) about it.
+
+    The turn goes from the first `perpendicular` to the second.
+    """
+    u, w = perpendicular(axis.direction)
+    y = -(np.cos(turn) * u + np.sin(turn) * w)
+    T = np.eye(4)
+    T[:3, :3] = np.stack([np.cross(y, axis.direction), y, axis.direction], axis=1)
+    T[:3, 3] = axis.point + height * axis.direction
+    return T
+
+
 def fit_axis(points: Array, start: Axis, *, robust_scale: float | None = None) -> Axis | None:
     """Least-squares cylinder through ``points`` (n, 3), n >= 5, from ``start``; None if it is a plane or diverges.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FittedSurface:
     """A piece of a circular cylinder fitted to part of a mesh.
 
@@ -43,14 +43,18 @@ class FittedSurface:
     residual_max: float
     points: int
     covered_area: float
-    coverage: float
-    covariance: Array
-    covariance_error: float
     form_error: float
-    chord_error: float
     arc_error: float
     length_error: float
     faces: IntArray
+    covariance: Array = field(default_factory=lambda: np.zeros((5, 5)))
+    covariance_error: float = 0.0
+    chord_error: float = 0.0
+
+    @property
+    def coverage(self) -> float:
+        """Share of the surface, from end to end of its arc and its length, that triangles cover."""
+        return min(1.0, self.covered_area / (2.0 * self.half_angle * self.radius * self.length))
 
     @property
     def radius_std(self) -> float:
@@ -93,7 +97,7 @@ class FittedSurface:
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GrooveFit(FittedSurface):
     """A concave arc: material outside the radius, mouth to +y."""
 
@@ -103,7 +107,7 @@ class GrooveFit(FittedSurface):
         return SweptArc(self.radius, self.half_angle, self.length)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CylinderFit(FittedSurface):
     """A convex cylinder: material inside the radius; a full turn (wire, bolt) or an arc (round back)."""
 
@@ -118,7 +122,7 @@ class CylinderFit(FittedSurface):
         return Cylinder(self.radius, self.length)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class HoleFit(FittedSurface):
     """A concave cylinder all the way round; ``through`` if both ends are open."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, border, facet_span
+from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, angles, border, turned
 from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import sagitta
@@ -49,8 +49,14 @@ class Search:
     strips: bool
 
     def span(self, axis: Axis, faces: IntArray) -> Array:
-        """Angle (rad) about the axis of each planar cell that has some of ``faces``."""
-        return facet_span(self.surface, axis, faces, self.cells)
+        """Angle (rad) about the axis of each planar cell that has some of ``faces``, counting those faces only."""
+        angle = angles(self.surface, axis, faces, *perpendicular(axis.direction))
+        names, first, cell = np.unique(self.cells[faces], return_index=True, return_inverse=True)
+        about = turned(angle, angle[first, :1][cell])
+        largest, least = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+        np.maximum.at(largest, cell, about.max(axis=1))
+        np.minimum.at(least, cell, about.min(axis=1))
+        return np.asarray(largest - least)
 
 
 def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float) -> Region | None:

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, perpendicular, surface_error
+from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, frame, perpendicular, surface_error, upward
 from clamp3d.fit.grow import Region
 from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
 from clamp3d.geometry.mesh import IntArray
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_source
 from clamp3d.geometry.profile import sagitta
 
 FULL_TURN_GAP = np.radians(30.0)
 """A surface whose largest uncovered angle is below this goes all the way round."""
 
 
-def arc(surface: Surface, axis: Axis, u: Array, w: Array, faces: IntArray) -> tuple[float, float]:
-    """Middle (rad, from u towards w) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
-    a = angles(surface, axis, faces, u, w)
+def arc(surface: Surface, axis: Axis, faces: IntArray) -> tuple[float, float]:
+    """Middle (rad, as `frame` turns) and half angle of the arc that ``faces`` cover; half angle pi for a full turn."""
+    a = angles(surface, axis, faces, *perpendicular(axis.direction))
     return covered(a[:, :1] + turned(a, a[:, :1]), FULL_TURN_GAP)
 
 
@@ -46,19 +46,14 @@ def _ends(values: Array, lengths: Array, sides: list[BoolArray], step: float) ->
 
 def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     """Frame, extent, residuals and errors of ``region``; None if the points leave the cylinder open."""
-    d = region.axis.direction
-    d = d if d[int(np.argmax(np.abs(d)))] > 0.0 else -d
-    axis = Axis(region.axis.point, d, region.axis.radius)
-    u, w = perpendicular(d)
-    middle, half = arc(surface, axis, u, w, region.faces)
-    deepest = np.cos(middle) * u + np.sin(middle) * w
-    R = np.stack([np.cross(-deepest, d), -deepest, d], axis=1)
-
-    corners = (surface.V[np.unique(surface.F[region.faces])] - axis.point) @ R
+    axis = Axis(region.axis.point, upward(region.axis.direction), region.axis.radius)
+    middle, half = arc(surface, axis, region.faces)
+    T = frame(axis, middle, 0.0)
+    corners = to_source(T, surface.V[np.unique(surface.F[region.faces])])
     z0, z1 = float(corners[:, 2].min()), float(corners[:, 2].max())
     crossing, _, _ = border(surface, region.faces)
     edges = np.concatenate([surface.edges[crossing], surface.rim[np.isin(surface.rim_faces, region.faces)]])
-    local = (surface.V[edges] - axis.point) @ R
+    local = to_source(T, surface.V[edges])
     lengths = np.linalg.norm(local[:, 1] - local[:, 0], axis=1)
     along = np.abs(local[:, 1, 2] - local[:, 0, 2]) > 0.5 * lengths
     z, angle = local[:, :, 2].mean(axis=1), np.arctan2(local[:, :, 0], -local[:, :, 1]).mean(axis=1)
@@ -66,23 +61,17 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     v, t = (2.0 * z - z0 - z1) / (z1 - z0), angle / half
     length_error = arc_error = 0.0
     rounds = [~along & (k * v > 0.8) & (np.abs(t) < 0.85) for k in (-1, 1)]
-    facet = float(np.median(np.ptp((surface.V[surface.F[region.faces]]) @ d, axis=1)))
+    facet = float(np.median(np.ptp((surface.V[surface.F[region.faces]]) @ axis.direction, axis=1)))
     if ends := _ends(z, lengths, rounds, _straddling(region, facet, z1 - z0)):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
     facet = _facet(surface, axis, region.faces)
     if half < np.pi and (ends := _ends(angle, lengths, lips, _straddling(region, facet, 2.0 * half))):
         a, b, arc_error = ends
-        half = 0.5 * (b - a)
-        c, s = np.cos(0.5 * (a + b)), np.sin(0.5 * (a + b))
-        R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    length = z1 - z0
-    T = np.eye(4)
-    T[:3, :3] = R
-    T[:3, 3] = axis.point + 0.5 * (z0 + z1) * d
-    if length <= 0.0 or half <= 0.0:
+        half, middle = 0.5 * (b - a), middle + 0.5 * (a + b)
+    if z1 <= z0 or half <= 0.0:
         return None
-    errors = _errors(surface, region, axis, T, (half, length))
+    errors = _errors(surface, region, axis, frame(axis, middle, 0.5 * (z0 + z1)), (half, z1 - z0))
     return None if errors is None else errors | {"arc_error": arc_error, "length_error": length_error}
 
 
@@ -90,8 +79,8 @@ def _errors(
     surface: Surface, region: Region, axis: Axis, T: Array, extent: tuple[float, float]
 ) -> dict[str, Any] | None:
     """Values of a `FittedSurface` with frame ``T`` (4, 4) and ``extent`` (half angle, length); None if it is open."""
-    (half, length), R = extent, T[:3, :3]
-    points = (surface.V[region.points] - T[:3, 3]) @ R
+    half, length = extent
+    points = to_source(T, surface.V[region.points])
     residual = np.hypot(points[:, 0], points[:, 1]) - axis.radius
     worst = float(np.abs(residual).max())
     if region.strips:
@@ -112,7 +101,6 @@ def _errors(
         "residual_max": float(np.abs(residual).max()),
         "points": len(points),
         "covered_area": area,
-        "coverage": min(1.0, area / (2.0 * half * axis.radius * length)),
         # Few points know their own scatter badly: three standard errors shall mean 99.73 % all the same.
         "covariance": C * (stdtrit(freedom, 0.5 * (1.0 - CONFIDENCE)) / 3.0) ** 2,
         "covariance_error": surface_error(C, half, length, freedom),

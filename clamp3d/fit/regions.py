@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
+from clamp3d.fit.cylinder import Axis, fit_axis
 from clamp3d.fit.grow import Region, Search
 from clamp3d.fit.measure import arc
 from clamp3d.fit.seeds import patches, strips
@@ -60,7 +60,7 @@ def _joined(surface: Surface, a: Region, b: Region) -> Region | None:
     # Far apart along the axis they are two features: one groove would claim material where there is none.
     gap, length, shorter = _along(surface, axis, a.faces, b.faces)
     faces = np.concatenate([a.faces, b.faces])
-    half = arc(surface, axis, *perpendicular(axis.direction), faces)[1]
+    half = arc(surface, axis, faces)[1]
     if gap > 0.25 * shorter or float(surface.areas[faces].sum()) < half * axis.radius * length:
         return None
     return Region(axis, a.sign, faces, points, tolerance, span, a.strips and b.strips)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from clamp3d.fit.cylinder import Axis, perpendicular
+from clamp3d.fit.cylinder import Axis
 from clamp3d.geometry.mesh import Array, IntArray, Mesh
 
 BoolArray = NDArray[np.bool_]
@@ -96,14 +96,3 @@ def covered(u: Array, least: float) -> tuple[float, float]:
         return 0.0, np.pi
     half = np.pi - 0.5 * float(gaps[k])
     return float(reached[k] + gaps[k]) + half, half
-
-
-def facet_span(surface: Surface, axis: Axis, faces: IntArray, cells: IntArray) -> Array:
-    """Angle (rad) about the axis of each planar cell that has some of ``faces``, counting those faces only."""
-    angle = angles(surface, axis, faces, *perpendicular(axis.direction))
-    names, first, cell = np.unique(cells[faces], return_index=True, return_inverse=True)
-    about = turned(angle, angle[first, :1][cell])
-    largest, least = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    np.maximum.at(largest, cell, about.max(axis=1))
-    np.minimum.at(least, cell, about.min(axis=1))
-    return np.asarray(largest - least)
