@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
 from clamp3d.baselines.fcl_shapes import convex
@@ -55,15 +56,9 @@ class Hulls(PolytopeModel):
 
     def cut(self, name: str, part: Solid) -> Polytopes:
         """See `PolytopeModel`."""
-        made = mesh(part, self.mesh_error)
-        self.decompositions[name] = decompose(
-            made.vertices,
-            made.faces,
-            self.parameters,
-            name=name,
-            time_limit=self.time_limit,
-            progress=self.progress,
-        )
+        whole = mesh(part, self.mesh_error)
+        limits: dict[str, Any] = {"time_limit": self.time_limit, "progress": self.progress}
+        self.decompositions[name] = decompose(whole.vertices, whole.faces, self.parameters, name=name, **limits)
         hulls = self.decompositions[name].hulls
         names = [f"hull {i + 1}" for i in range(len(hulls))]
         shapes = [convex(corners, f"{name} {n}") for corners, n in zip(hulls, names, strict=True)]

@@ -250,8 +250,8 @@ class Method(Quiet):
         if equilibria and solver != "exact":
             raise click.UsageError(f"--equilibria goes with --solver exact, not {solver}")
         others = self.method == "cas" and solver == "exact" if equilibria is None else equilibria
-        given = {key: value for key, value in moves.items() if value is not None}
-        return {"solver": solver, "others": others} | given
+        chosen = {key: value for key, value in moves.items() if value is not None}
+        return {"solver": solver, "others": others} | chosen
 
     def model(self, clamp: Clamp) -> ContactModel:
         """The contact model. Raises InputError for options that do not go with it."""

@@ -34,17 +34,16 @@ def read_object(source: Any) -> tuple[Reading, str]:
     return bodies_of([node]), node.name
 
 
-def _node(item: Any) -> Node | None:
-    """A tree of shapes; None for what is no shape."""
+def _node(item: Any, name: str = "part") -> Node | None:
+    """A tree of shapes, called ``name`` where they have none of their own; None for what is no shape."""
     if hasattr(item, "ShapeType") and hasattr(item, "Location"):  # TopoDS_Shape
-        return None if item.IsNull() else Node("part", np.eye(4), item)
+        return None if item.IsNull() else Node(name, np.eye(4), item)
     if hasattr(item, "children") and hasattr(item, "loc") and hasattr(item, "obj"):  # CadQuery Assembly
-        own = _all(_node(item.obj), item.name)
-        return Node(item.name, matrix(item.loc.wrapped), None, [*own, *_nodes(item.children)])
+        below = [*_nodes([item.obj], item.name), *_nodes(item.children)]
+        return Node(item.name, matrix(item.loc.wrapped), None, below)
     if hasattr(item, "vals"):  # CadQuery Workplane
-        return Node("part", np.eye(4), None, _nodes(item.vals()))
-    label = str(getattr(item, "label", "") or "part")
-    part = getattr(item, "part", None)
+        return Node(name, np.eye(4), None, _nodes(item.vals(), name))
+    label = str(getattr(item, "label", "") or name)
     try:
         is_shape = hasattr(item, "wrapped")
     except AssertionError:  # build123d, of a shape that holds nothing
@@ -54,18 +53,12 @@ def _node(item: Any) -> Node | None:
         if children:  # build123d: the children are placed in their parent's frame, and its shape holds them
             return Node(label, matrix(item.wrapped.Location()), None, _nodes(children))
         return None if item.wrapped is None else Node(label, np.eye(4), item.wrapped)
+    part = getattr(item, "part", None)
     return None if part is None else _node(part)  # build123d BuildPart
 
 
-def _all(node: Node | None, name: str) -> list[Node]:
-    """The node and what is directly below it, called ``name``."""
-    if node is None:
-        return []
-    return [Node(name, node.T, node.shape, [Node(name, n.T, n.shape, n.below) for n in node.below])]
-
-
-def _nodes(items: Iterable[Any]) -> list[Node]:
-    return [node for item in items if (node := _node(item)) is not None]
+def _nodes(items: Iterable[Any], name: str = "part") -> list[Node]:
+    return [node for item in items if (node := _node(item, name)) is not None]
 
 
 def _trimesh(source: Any) -> tuple[Reading, str]:

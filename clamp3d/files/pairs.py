@@ -55,10 +55,10 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
     Its border is meshed with chords that are ``share`` of its thickness, volume over area, or of its size divided by
     `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
     """
-    made = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
-    if not made.IsDone():
+    operation = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
+    if not operation.IsDone():
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
-    shape = made.Shape()
+    shape = operation.Shape()
     if next(explore(shape, "SOLID"), None) is None:
         return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)

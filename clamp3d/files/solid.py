@@ -85,11 +85,11 @@ class BrepSolid(MeshShape):
     @cached_property
     def mesh(self) -> Mesh:
         """Its triangles at `CHORD`."""
-        made = self.tessellated(CHORD)
-        closed = is_closed(made.faces)
+        triangles = self.tessellated(CHORD)
+        closed = is_closed(triangles.faces)
         notes = () if closed else ("the triangles of the solid do not close",)
-        rounding = float(np.abs(made.vertices).max()) * 2.0**-50
-        return Mesh(self.name, made.vertices, made.faces, closed, rounding, notes)
+        rounding = float(np.abs(triangles.vertices).max()) * 2.0**-50
+        return Mesh(self.name, triangles.vertices, triangles.faces, closed, rounding, notes)
 
     @property
     def error(self) -> float:

@@ -26,7 +26,7 @@ _LEAST = 8
 _MAX_SEEDS = 250
 
 
-def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Region]:
+def strips(search: Search, progress: Callable[[str, float], None]) -> Iterator[Region]:
     """Cylinders of an exact tessellation among the free faces; the caller takes what is found off them."""
     surface, cells, floor = search.surface, search.cells, search.floor
     V = surface.V
@@ -47,7 +47,7 @@ def strips(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regio
     fails = np.zeros(cells.max() + 1, dtype=np.int64)
     for n, k in enumerate(order):
         if n % 50 == 0:
-            tell("strips", n / len(order))
+            progress("strips", n / len(order))
         i, j = surface.pairs[k]
         a, b = cells[i], cells[j]
         if not (search.free[i] and search.free[j]) or fails[a] > 2 or fails[b] > 2:
@@ -80,7 +80,7 @@ def _groups(values: IntArray, label: IntArray) -> dict[int, IntArray]:
     return {int(k): v for k, v in zip(names, np.split(values[order], start[1:]), strict=True)}
 
 
-def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Region]:
+def patches(search: Search, progress: Callable[[str, float], None]) -> Iterator[Region]:
     """Cylinders among the free faces, seeded all over; the caller takes what is found off them."""
     surface, free, cells = search.surface, search.free, search.cells
     seeds = free & (np.bincount(cells)[cells] <= 4)
@@ -99,7 +99,7 @@ def patches(search: Search, tell: Callable[[str, float], None]) -> Iterator[Regi
         tried += 1
         if tried > _MAX_SEEDS:
             return
-        tell("patches", n / len(order))
+        progress("patches", n / len(order))
         nearest = _nearest(surface, tree, start, _PATCH_SIZES[-1])
         facing = nearest[free[nearest] & ((surface.normals[nearest] @ surface.normals[start]) > 0.5)]
         region = _from_patches(search, [facing[label[facing] == label[start]] for label in gates], limit, seeds)

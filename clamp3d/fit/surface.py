@@ -28,16 +28,17 @@ class Surface:
         # The normals of slivers are rounding.
         self.rows = np.flatnonzero(~mesh.slivers)
         self.V, self.F = mesh.vertices, mesh.faces[self.rows]
-        known = trimesh.Trimesh(self.V, self.F, process=False, validate=False)
-        self.normals, self.areas, self.centres = known.face_normals, known.area_faces, known.triangles_center
-        self.edges, self.pairs, opposite = (
-            known.face_adjacency_edges,
-            known.face_adjacency,
-            known.face_adjacency_unshared,
+        triangles = trimesh.Trimesh(self.V, self.F, process=False, validate=False)
+        self.normals, self.areas, self.centres = (
+            triangles.face_normals,
+            triangles.area_faces,
+            triangles.triangles_center,
         )
-        _, number, count = np.unique(known.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+        self.edges, self.pairs = triangles.face_adjacency_edges, triangles.face_adjacency
+        opposite = triangles.face_adjacency_unshared
+        _, number, count = np.unique(triangles.edges_sorted, axis=0, return_inverse=True, return_counts=True)
         alone = np.flatnonzero(count[number.ravel()] == 1)
-        self.rim, self.rim_faces = known.edges[alone], known.edges_face[alone]
+        self.rim, self.rim_faces = triangles.edges[alone], triangles.edges_face[alone]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.

@@ -116,13 +116,13 @@ def _is_clamp(path: Path) -> bool:
     if not named_toml and not os.path.isfile(path):
         raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices()}")
     try:
-        given = set(parse_toml(read_text(path), str(path)))
+        keys = set(parse_toml(read_text(path), str(path)))
     except InputError:
         if named_toml:
             raise
         raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
     of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.__struct_fields__}
-    as_clamp, as_scene = len(given & of_clamp - of_scene), len(given & of_scene - of_clamp)
+    as_clamp, as_scene = len(keys & of_clamp - of_scene), len(keys & of_scene - of_clamp)
     if not as_clamp and not as_scene:
         raise InputError(
             f"{checks.short(path)}: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp], ...)"
