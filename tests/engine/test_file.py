@@ -135,6 +135,7 @@ def test_motions():
     assert [m.name for m in scene.motions] == ["motion 1", "turn", "motion 3"]
     np.testing.assert_allclose(scene.motions[1].travel, [0, 0, 5.0])
     assert scene.motions[1].angle == pytest.approx(4 * math.pi)
+    np.testing.assert_array_equal(scene.motions[1].point, [0, 0, 0])
 
 
 @pytest.mark.parametrize(

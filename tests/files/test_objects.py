@@ -49,7 +49,7 @@ def test_shapes_of_open_cascade_and_of_cadquery():
 
     from tests.cad import location
 
-    assert volumes(load(BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape())) == pytest.approx([6.0])
+    assert volumes(load(BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
     # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.
     T, S = pose(np.random.default_rng(1)), pose(np.random.default_rng(2))
     held = SimpleNamespace(wrapped=pin())
