@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from clamp3d import checks
 from clamp3d.checks import function, instance
@@ -20,6 +21,7 @@ from clamp3d.fit.measure import measure
 from clamp3d.fit.regions import find_regions, join
 from clamp3d.fit.surface import Surface
 from clamp3d.geometry.mesh import Array, Mesh
+from clamp3d.geometry.pose import to_source
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,15 +106,13 @@ def fit_file(
     file = checks.path("path", path)
     reading = load_bodies(file, unit=unit)
     if isinstance(reading.bodies[0].shape, BrepSolid):
-        mesh, surfaces, notes = cad_features(reading, file.name)
-        return _result(mesh, surfaces, mesh.vertices[mesh.faces], notes)
+        return _result(*cad_features(reading, file.name))
     return fit_mesh(reading.merged(file.name), progress=progress)
 
 
 def fit_solid(solid: BrepSolid) -> FitResult:
     """The cylindrical faces of a solid from CAD, with its own mesh."""
-    mesh, features, notes = cad_features(Reading([Body(solid.name, solid, np.eye(4))]), solid.name)
-    return _result(mesh, features, mesh.vertices[mesh.faces], notes)
+    return _result(*cad_features(Reading([Body(solid.name, solid, np.eye(4))]), solid.name))
 
 
 def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None) -> FitResult:
@@ -149,12 +149,13 @@ def fit_mesh(mesh: Mesh, *, progress: Callable[[str, float], None] | None = None
     function("progress", progress)
     surface = Surface(mesh)
     regions = join(surface, find_regions(surface, progress))
-    surfaces = [(float(region.sign), measure(surface, region)) for region in regions]
-    return _result(mesh, [(k, v) for k, v in surfaces if v is not None], surface.V[surface.F], list(mesh.notes))
+    surfaces = [(float(region.sign), values) for region in regions if (values := measure(surface, region)) is not None]
+    return _result(mesh, surfaces, list(mesh.notes))
 
 
-def _result(mesh: Mesh, surfaces: list[tuple[float, dict[str, Any]]], corners: Array, notes: list[str]) -> FitResult:
-    """The features whose sense and values were ``surfaces``, named; ``corners`` (m, 3, 3) of all triangles."""
+def _result(mesh: Mesh, surfaces: list[tuple[float, dict[str, Any]]], notes: list[str]) -> FitResult:
+    """The features with the sense and the values of ``surfaces``, named."""
+    corners = mesh.vertices[mesh.faces]
     grooves: list[GrooveFit] = []
     cylinders: list[CylinderFit] = []
     holes: list[HoleFit] = []
@@ -167,21 +168,14 @@ def _result(mesh: Mesh, surfaces: list[tuple[float, dict[str, Any]]], corners: A
             holes.append(HoleFit(name=f"H{len(holes) + 1}", **values, through=_open_ended(corners, values)))
     if not grooves:
         notes = [*notes, "no groove: no concave circular arc found"]
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return FitResult(
-        mesh=mesh,
-        grooves=tuple(grooves),
-        cylinders=tuple(cylinders),
-        holes=tuple(holes),
-        area=0.5 * float(np.linalg.norm(sides, axis=1).sum()),
-        notes=tuple(notes),
-    )
+    area = float(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).area)
+    return FitResult(mesh, tuple(grooves), tuple(cylinders), tuple(holes), area, tuple(notes))
 
 
 def _open_ended(corners: Array, values: dict[str, Any]) -> bool:
     """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
     T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
-    x, y, z = np.moveaxis((corners - T[:3, 3]) @ T[:3, :3], -1, 0)
+    x, y, z = np.moveaxis(to_source(T, corners), -1, 0)
     # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
     e = np.roll(x, -1, axis=1) * np.roll(y, -2, axis=1) - np.roll(y, -1, axis=1) * np.roll(x, -2, axis=1)
     total = e.sum(axis=1)

@@ -72,6 +72,14 @@ def test_normal_is_right_however_small_the_gap(gap: float) -> None:
         assert np.abs(found.point[1] - 10.0) < 1e-6
 
 
+@pytest.mark.parametrize("gap", [1.0, 1e-2])
+def test_normal_at_a_rim_is_the_way_to_the_part(gap: float) -> None:
+    T = translation(0.0, 10.0 + gap + (10.0 + 7.0) * math.sqrt(0.5), 0.0) @ rotation([1.0, 0.0, 0.0], math.pi / 4)
+    found = measure(BOX, placed(7.0, 20.0, T))
+    assert found.distance == pytest.approx(gap, abs=1e-6)
+    assert np.abs(found.normal - [0.0, 1.0, 0.0]).max() < 1e-3
+
+
 def test_touching_poses_neither_end_nor_hang_the_interpreter() -> None:
     # FCL's own signed distance aborts on some of these.
     rng = np.random.default_rng(0)
