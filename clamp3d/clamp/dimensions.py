@@ -305,28 +305,23 @@ class Clamp:
         return rows.get(first, {}).get(second, 0)
 
     def __post_init__(self) -> None:
-        r, down = self.bolt.diameter / 2, self.down_splint
+        down = self.down_splint
         for key, wire in (("line", self.line), ("jumper", self.jumper)):
             _rule(
                 wire.radius < self.up_splint.width,
                 f"{key}: the diameter must be less than twice up_splint.width = {self.up_splint.width:g} mm, "
                 f"got {2.0 * wire.radius:g}; are both in mm?",
             )
-        for key, opening in (
-            ("up_splint.hole_diameter", self.up_splint.hole_diameter),
-            ("saddle.hole_diameter", self.saddle.hole_diameter),
-            ("down_splint.slot_length", down.slot_length),
-            ("nut.across_flats", self.nut.across_flats),
+        bolt = ("bolt.diameter", self.bolt.diameter)
+        for key, value, (other, least) in (
+            ("up_splint.hole_diameter", self.up_splint.hole_diameter, bolt),
+            ("saddle.hole_diameter", self.saddle.hole_diameter, bolt),
+            ("down_splint.slot_length", down.slot_length, bolt),
+            ("nut.across_flats", self.nut.across_flats, bolt),
+            ("down_splint.slot_width", down.slot_width, bolt),
+            ("saddle.radius", self.saddle.radius, ("down_splint.back_radius", down.back_radius)),
         ):
-            _rule(opening > 2 * r, f"{key} must be > bolt.diameter = {2 * r:g} mm, got {opening:g}")
-        _rule(
-            down.slot_width > 2 * r,
-            f"down_splint.slot_width must be > bolt.diameter = {2 * r:g} mm, got {down.slot_width:g}",
-        )
-        _rule(
-            self.back_clearance > 0.0,
-            f"saddle.radius must be > down_splint.back_radius = {down.back_radius:g} mm, got {self.saddle.radius:g}",
-        )
+            _rule(value > least, f"{key} must be > {other} = {least:g} mm, got {value:g}")
         reach = math.degrees(self._saddle_edge[1])
         _rule(
             down.back_half_angle_deg >= reach,

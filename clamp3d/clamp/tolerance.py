@@ -179,20 +179,26 @@ def monte_carlo(
     (('clamped', 'clamped', 'clamped'), True)
     """
     instance("clamp", clamp, Clamp)
-    n, processes = whole("n", n, least=1), whole("processes", processes, least=1)
+    n, processes, seed = whole("n", n, least=1), whole("processes", processes, least=1), whole("seed", seed, least=0)
     function("progress", progress)
-    spec, nominal, nominal_status = _spec(
-        clamp, whole("seed", seed, least=0), tolerance, wire_tolerance_percent, distribution
-    )
-    chunks: dict[int, list[Sample]] = {}
-    tell = progress or (lambda done, of: None)
-    tell(0, n)
-    for k, chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
-        chunks[k] = chunk
-        tell(sum(map(len, chunks.values())), n)
-    samples = [sample for k in sorted(chunks) for sample in chunks[k]]
+    choice("distribution", distribution, ("uniform", "normal"))
+    spec = Spec(clamp, seed, distribution, _tolerances(clamp, tolerance, wire_tolerance_percent))
+    nominal, nominal_status = _closed(clamp)
+    samples = _samples(spec, n, processes, scheduler, progress or (lambda done, of: None))
     distance = np.array([math.nan if d is None else d for d, _ in samples])
     return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
+
+
+def _samples(
+    spec: Spec, n: int, processes: int, scheduler: str | None, progress: Callable[[int, int], None]
+) -> list[Sample]:
+    """Samples 0 to ``n``, in order."""
+    progress(0, n)
+    chunks: dict[int, list[Sample]] = {}
+    for k, chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
+        chunks[k] = chunk
+        progress(sum(map(len, chunks.values())), n)
+    return [sample for k in sorted(chunks) for sample in chunks[k]]
 
 
 def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
@@ -207,23 +213,16 @@ def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
     }
 
 
-def _spec(
-    clamp: Clamp, seed: int, tolerance: float | None, percent: float, distribution: Distribution
-) -> tuple[Spec, float | None, str]:
+def _tolerances(clamp: Clamp, tolerance: float | None, percent: float) -> tuple[float, ...]:
+    """Mm either way for each of `DIMENSIONS`."""
     if tolerance is not None and not 0.0 <= (tolerance := number("tolerance", tolerance)) < 1e5:
         raise InputError(f"tolerance must be >= 0 and < 100000 mm, got {tolerance:g}")
     if not 0.0 <= (percent := number("wire tolerance", percent)) <= 100.0 * _TOP:
         raise InputError(f"wire tolerance must be from 0 to {100.0 * _TOP:g} %, got {percent:g}")
-    choice("distribution", distribution, ("uniform", "normal"))
-
-    def of(name: str) -> float:
-        size = dimension(clamp, name)
-        if name in ("line.diameter", "jumper.diameter"):
-            return size * percent / 100.0
-        return general_tolerance(size) if tolerance is None else tolerance
-
-    spec = Spec(clamp, seed, distribution, tuple(of(name) for name in DIMENSIONS))
-    return spec, *_closed(clamp)
+    sizes = {name: dimension(clamp, name) for name in DIMENSIONS}
+    general = {name: general_tolerance(size) if tolerance is None else tolerance for name, size in sizes.items()}
+    wires = {name: sizes[name] * percent / 100.0 for name in ("line.diameter", "jumper.diameter")}
+    return tuple((general | wires).values())
 
 
 def _chunk(spec: Spec, indices: range) -> tuple[int, list[Sample]]:
@@ -232,14 +231,12 @@ def _chunk(spec: Spec, indices: range) -> tuple[int, list[Sample]]:
 
 def _sample(spec: Spec, index: int) -> Sample:
     try:
-        clamp = with_dimensions(spec.clamp, sample_dimensions(spec, index))
+        distance, status = _closed(with_dimensions(spec.clamp, sample_dimensions(spec, index)))
     except InputError as error:
-        return None, f"not a clamp: {without_numbers(str(error))}"
-    try:
-        distance, status = _closed(clamp)
-        return distance, without_numbers(status)
+        distance, status = None, f"not a clamp: {error}"
     except SolverError as error:
-        return None, f"{UNPROVEN}: {without_numbers(str(error))}"
+        distance, status = None, f"{UNPROVEN}: {error}"
+    return distance, without_numbers(status)
 
 
 def _closed(clamp: Clamp) -> Sample:
