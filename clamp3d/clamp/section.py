@@ -101,6 +101,13 @@ class _Gap:
     centre: Point
     curvature: float = 0.0
 
+    @classmethod
+    def flat(cls, parts: Pair, feature: str, origin: Point, normal: Point, centre: Point, radius: float = 0.0) -> _Gap:
+        """The gap of a straight surface through ``origin`` to a corner, or to a round of ``radius`` mm."""
+        height = (centre[0] - origin[0]) * normal[0] + (centre[1] - origin[1]) * normal[1]
+        foot = (centre[0] - height * normal[0], centre[1] - height * normal[1])
+        return cls(*parts, feature, height - radius, foot, normal, centre)
+
 
 class _Frame(NamedTuple):
     """Where a part stands, seen from P1: place in mm, cosine and sine of its angle."""
@@ -369,10 +376,10 @@ class Section:
 
     def _wire(self, wire: PartName, q: Array, down: _Frame) -> list[_Gap]:
         """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
-        i, side, axis = 2 * WIRES.index(wire), (-1.0 if wire == "P6" else 1.0), self.bolt_x + float(q[B])
-        (x, y), shank = q[i : i + 2].tolist(), 0.5 * self.clamp.bolt.diameter
-        gap = side * (x - axis) - shank - self.pairs["P1", wire].cylinder.radius
-        bolt = _Gap("P4", wire, "shank", gap, (axis + side * shank, y), (side, 0.0), (x, y))
+        i, side = 2 * WIRES.index(wire), -1.0 if wire == "P6" else 1.0
+        shank = (self.bolt_x + float(q[B]) + side * 0.5 * self.clamp.bolt.diameter, 0.0)
+        radius = self.pairs["P1", wire].cylinder.radius
+        bolt = _Gap.flat(("P4", wire), "shank", shank, (side, 0.0), q[i : i + 2].tolist(), radius)
         return [*self._groove("P1", wire, q, down), *self._groove("P2", wire, q, down), bolt]
 
     def _groove(self, part: PartName, inside: PartName, q: Array, down: _Frame) -> list[_Gap]:
@@ -432,14 +439,12 @@ class Section:
     def _faces(self, down: _Frame) -> list[_Gap]:
         """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
         up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
-        c, s = down.cos, down.sin
         for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
             corner, edge = down.point(side * self.lever, face), (self.bolt_x + side * 0.5 * up.width, up.thickness)
             if side * (corner[0] - edge[0]) <= 0.0:  # P2's corner under P1's face
-                rows.append(_Gap("P1", "P2", feature, corner[1] - up.thickness, corner, (0.0, 1.0), corner))
+                rows.append(_Gap.flat(("P1", "P2"), feature, edge, (0.0, 1.0), corner))
             else:  # P1's edge over P2's face
-                gap = face - ((edge[0] - down.x) * s + (edge[1] - down.y) * c)
-                rows.append(_Gap("P2", "P1", feature, gap, edge, (-s, -c), edge))
+                rows.append(_Gap.flat(("P2", "P1"), feature, corner, down.turned(0.0, -1.0), edge))
         return rows
 
     def _stops(self, q: Array, down: _Frame) -> list[_Gap]:
@@ -449,22 +454,19 @@ class Section:
         splint, saddle, up = clamp.down_splint, clamp.saddle, clamp.up_splint
         # Centred, the slot's lower ends meet the shank first.
         depths = (splint.slot_bottom, splint.face_depth) if joints.washer or joints.saddle else (splint.slot_bottom,)
-        shift, saddle_shift, d = float(q[B]), float(q[V]), float(q[D])
-        axis, shank = self.bolt_x + shift, 0.5 * clamp.bolt.diameter
-        c, s = down.cos, down.sin
-        edge_y = d + saddle.radius * math.cos(saddle.half_angle) - clamp.back_clearance
+        axis, d = self.bolt_x + float(q[B]), float(q[D])
+        saddle_axis, edge_y = axis + float(q[V]), d + saddle.radius * math.cos(saddle.half_angle) - clamp.back_clearance
+        underside = down.point(0.0, splint.underside_depth)
         for side in (-1.0, 1.0):
-            edge = (axis + saddle_shift + side * 0.5 * saddle.width, edge_y)
-            gap = (edge[0] - down.x) * s + (edge[1] - down.y) * c - splint.underside_depth
-            rows.append(_Gap("P2", "P3", EDGES, gap, edge, (s, c), edge))
+            edge, shank = (saddle_axis + side * 0.5 * saddle.width, edge_y), axis + side * 0.5 * clamp.bolt.diameter
+            rows.append(_Gap.flat(("P2", "P3"), EDGES, underside, down.turned(0.0, 1.0), edge))
             for depth in depths:
                 wall = down.point(side * 0.5 * splint.slot_width, depth)
-                rows.append(_Gap("P4", "P2", "slot", side * (wall[0] - axis) - shank, wall, (side, 0.0), wall))
+                rows.append(_Gap.flat(("P4", "P2"), "slot", (shank, 0.0), (side, 0.0), wall))
             if joints.hole:
-                gap, point = 0.5 * up.hole_diameter - shank - side * shift, (axis + side * shank, 0.5 * up.thickness)
-                rows.append(_Gap("P1", "P4", "hole", gap, point, (-side, 0.0), point))
+                hole = (self.bolt_x + side * 0.5 * up.hole_diameter, 0.0)
+                rows.append(_Gap.flat(("P1", "P4"), "hole", hole, (-side, 0.0), (shank, 0.5 * up.thickness)))
             if joints.washer:
-                gap = 0.5 * saddle.hole_diameter - shank - side * saddle_shift
-                point = (axis - side * shank, d + splint.back_radius)
-                rows.append(_Gap("P3", "P4", "hole", gap, point, (side, 0.0), point))
+                hole = (saddle_axis + side * 0.5 * saddle.hole_diameter, 0.0)
+                rows.append(_Gap.flat(("P3", "P4"), "hole", hole, (-side, 0.0), (shank, d + splint.back_radius)))
         return rows
