@@ -32,7 +32,7 @@ from scipy.optimize import bisect, linprog, nnls
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING
-from clamp3d.clamp.dimensions import Clamp, Joints, PartName
+from clamp3d.clamp.dimensions import Clamp, Joints
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
@@ -121,50 +121,46 @@ class Band:
         return plain(self)
 
 
-@dataclass(frozen=True, slots=True)
-class _Wire:
-    """A wire and its two arcs: centre of P1's arc from P1's corner (``up``), of P2's from P2's origin (``down``), half
-    angles of both, and what each arc's radius is larger than the wire's; mm and rad, x right and y down."""
+class _Arcs:
+    """Both wires and their arcs in P1 and P2: arrays (splint, wire), mm and rad, x right and y down.
 
-    up: Array
-    down: Array
-    half_angles: tuple[float, float]
-    slack: tuple[float, float]
+    ``centre`` (2, 2, 2) of P1's arcs from P1's corner, of P2's from P2's origin; ``half_angle`` of the arcs, and
+    ``slack``, what an arc's radius is larger than the wire's.
+    """
 
-    @classmethod
-    def of(cls, section: Section, wire: PartName) -> _Wire:
-        """A wire of a clamp."""
-        pairs = [section.pairs[splint, wire] for splint in SPLINTS]
-        up, down = (p.T_a_groove[[0, 2], 3] * (1.0, -1.0) for p in pairs)
-        halves, slacks = zip(*((p.groove.half_angle, p.groove.radius - p.cylinder.radius) for p in pairs), strict=True)
-        return cls(up, down, halves, slacks)
+    def __init__(self, section: Section) -> None:
+        pairs = [[section.pairs[splint, wire] for wire in WIRES] for splint in SPLINTS]
+        self.bolt_x = section.bolt_x
+        self.centre = np.array([[pair.T_a_groove[[0, 2], 3] * (1.0, -1.0) for pair in row] for row in pairs])
+        self.half_angle = np.array([[pair.groove.half_angle for pair in row] for row in pairs])
+        self.slack = np.array([[pair.groove.radius - pair.cylinder.radius for pair in row] for row in pairs])
 
-    def offset(self, bolt_x: float, tilt: Array) -> tuple[Array, Array]:
-        """From P1's arc centre to P2's, mm, with P2's origin at P1's height."""
-        c, s, (u, v) = np.cos(tilt), np.sin(tilt), self.down
-        return bolt_x + u * c + v * s - self.up[0], v * c - u * s - self.up[1]
+    def offset(self, i: int, tilt: Array) -> tuple[Array, Array]:
+        """From P1's arc centre of wire ``i`` to P2's, mm, with P2's origin at P1's height."""
+        c, s, (x, y), (u, v) = np.cos(tilt), np.sin(tilt), *self.centre[:, i]
+        return self.bolt_x + u * c + v * s - x, v * c - u * s - y
 
-    def distance(self, bolt_x: float, tilt: Array, friction: float) -> Array:
-        """How far P2's origin is below P1's, mm, where the wire's forces are on the edges of the friction cones; NaN
-        where it cannot be."""
-        (p, q), (x, y) = self.slack, self.offset(bolt_x, tilt)
+    def distance(self, tilt: Array, friction: float) -> Array:
+        """How far (2, n) P2's origin is below P1's, mm, where a wire's forces are on the edges of the friction cones;
+        NaN where it cannot be."""
+        (p, q), (x, y) = self.slack, np.swapaxes([self.offset(i, tilt) for i in range(len(WIRES))], 0, 1)
         separation = p * p + q * q + 2.0 * p * q * math.cos(2.0 * math.atan(friction))  # squared
         with np.errstate(invalid="ignore"):
-            return np.asarray(-y - np.sqrt(separation - x * x))
+            return np.asarray(-y - np.sqrt(separation[:, None] - x * x))
 
-    def places(self, bolt_x: float, d: Array, tilt: Array) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
-        """Both places of the wire's centre with both contacts closed, mm, and whether both are on the arcs."""
-        (p, q), (x, y) = self.slack, self.offset(bolt_x, tilt)
+    def places(self, i: int, d: Array, tilt: Array) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+        """Both places of a wire's centre with both contacts closed, mm, and whether both are on the arcs."""
+        (p, q), (x, y) = self.slack[:, i], self.offset(i, tilt)
         y = y + d
         apart, c, s = np.maximum(np.hypot(x, y), 1e-300), np.cos(tilt), np.sin(tilt)
         along = (p * p - q * q + apart * apart) / (2.0 * apart)
-        places = []
-        for aside in np.sqrt(np.maximum(p * p - along * along, 0.0)) * np.array([-1.0, 1.0]).reshape(2, *[1] * d.ndim):
-            right, below = (along * x - aside * y) / apart, (along * y + aside * x) / apart
+        aside, places = np.sqrt(np.maximum(p * p - along * along, 0.0)), []
+        for sign in (-1.0, 1.0):
+            right, below = (along * x - sign * aside * y) / apart, (along * y + sign * aside * x) / apart
             dx, dy = right - x, below - y
-            on_arcs = np.abs(np.arctan2(right, -below)) <= self.half_angles[0]
-            on_arcs &= np.abs(np.arctan2(dx * c - dy * s, dx * s + dy * c)) <= self.half_angles[1]
-            places.append((self.up[0] + right, self.up[1] + below, on_arcs))
+            on_arcs = np.abs(np.arctan2(right, -below)) <= self.half_angle[0, i]
+            on_arcs &= np.abs(np.arctan2(dx * c - dy * s, dx * s + dy * c)) <= self.half_angle[1, i]
+            places.append((self.centre[0, i, 0] + right, self.centre[0, i, 1] + below, on_arcs))
         return places
 
 
@@ -194,8 +190,8 @@ class FrictionBand:
         return self.section.splint_distance(self.final.q)
 
     @cached_property
-    def _wires(self) -> tuple[_Wire, ...]:
-        return tuple(_Wire.of(self.section, wire) for wire in WIRES)
+    def _arcs(self) -> _Arcs:
+        return _Arcs(self.section)
 
     def ends(self, friction: float) -> tuple[float, float]:
         """The least and the greatest splint distance at which equilibrium exists, mm, without certificates."""
@@ -251,15 +247,14 @@ class FrictionBand:
 
     def _states(self, tilt: Array, share: Array, friction: float) -> tuple[Array, NDArray[np.bool_]]:
         """Distances d (n, m) at shares (m,) of each tilt's interval (n,), and whether all contacts are closed there."""
-        clamp, bolt_x = self.section.clamp, self.section.bolt_x
-        low = np.max([wire.distance(bolt_x, tilt, 0.0) for wire in self._wires], axis=0)
-        high = np.min([wire.distance(bolt_x, tilt, friction) for wire in self._wires], axis=0)
+        clamp = self.section.clamp
+        low, high = self._arcs.distance(tilt, 0.0).max(axis=0), self._arcs.distance(tilt, friction).min(axis=0)
         d, column = low[:, None] + share * (high - low)[:, None], tilt[:, None]
         valid = (low <= high)[:, None] & (np.abs(column) <= clamp.tilt_stop)
         half, up = min(self.section.lever, self.section.bolt_x), clamp.up_splint.thickness
         valid = valid & (d + clamp.down_splint.face_depth * np.cos(column) - half * np.abs(np.sin(column)) >= up)
-        for wire in self._wires:
-            valid = valid & np.any([on_arcs for _, _, on_arcs in wire.places(bolt_x, d, column)], axis=0)
+        for i in range(len(WIRES)):
+            valid = valid & np.any([on_arcs for _, _, on_arcs in self._arcs.places(i, d, column)], axis=0)
         return d, valid
 
     def _end(self, friction: float, sense: float) -> End:
@@ -289,11 +284,10 @@ class FrictionBand:
 
     def _closed_states(self, d: float, tilt: float) -> Iterator[Array]:
         """States (10,) of the section at d and tilt in which both wires touch both their arcs and nothing overlaps."""
-        bolt_x = self.section.bolt_x
-        places = [wire.places(bolt_x, np.array([d]), np.array([tilt])) for wire in self._wires]
+        places = [self._arcs.places(i, np.array(d), np.array(tilt)) for i in range(len(WIRES))]
         for (x6, y6, _), (x7, y7, _) in itertools.product(*places):
             q = np.zeros(SIZE)
-            q[:4], q[D], q[S] = (x6[0], y6[0], x7[0], y7[0]), d, self.section.lever * tilt
+            q[:4], q[D], q[S] = (x6, y6, x7, y7), d, self.section.lever * tilt
             gaps = self.section.gaps(q)
             touching = {pair for pair, gap in zip(gaps.pair, gaps.value, strict=True) if abs(gap) <= CLOSED}
             if gaps.value.min() >= -CLOSED and {(a, b) for a in ("P1", "P2") for b in WIRES} <= touching:
