@@ -29,6 +29,13 @@ MOVING = ("P1", "P2", "P3", "P4", "P5", "P7")
 WAYS = [np.array(v) for v in itertools.product((-1, 0, 1), repeat=3) if sum(map(abs, v)) == 1]
 
 
+def manifold(solid, T, mesh_error=0.01):
+    """A solid's facets at a pose (4, 4) of the world."""
+    facets = mesh(solid, mesh_error)
+    data = manifold3d.Mesh64(np.array(facets.vertices), np.array(facets.faces, dtype=np.uint64))
+    return manifold3d.Manifold(data).transform(T[:3])
+
+
 @cache
 def open_bodies():
     """Parts of the open clamp on the line as manifolds in the world, wires ten times as long as drawn."""
@@ -37,12 +44,7 @@ def open_bodies():
     solids = dict(parts(clamp))
     for name, wire in (("P6", clamp.line), ("P7", clamp.jumper)):
         solids[name] = wire_solid(name, wire.radius, 10.0 * clamp.wire_length)
-    bodies = {}
-    for name in PARTS:
-        facets = mesh(solids[name], 0.01)
-        data = manifold3d.Mesh64(np.array(facets.vertices), np.array(facets.faces, dtype=np.uint64))
-        bodies[name] = manifold3d.Manifold(data).transform(run.path[4].T_world(name)[:3])
-    return bodies
+    return {name: manifold(solids[name], run.path[4].T_world(name)) for name in PARTS}
 
 
 @cache

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from orders import manifold
 from outlines import outline
 from scipy.spatial import cKDTree
 
@@ -20,11 +21,10 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import close_on, placement
 from clamp3d.clamp.section import WIRES, Section
 from clamp3d.errors import InputError, NotClampedError
-from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import rotation
 from clamp3d.output.placement_report import capture_figure
 
-COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "40"))
+COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "16"))
 STIFF = 4.0
 """Springs of so many bolt forces a mm hold contacts: parts sink in by a few tenths of a mm."""
 STEP = 0.2 / STIFF
@@ -149,8 +149,13 @@ def test_random_starts_end_as_with_springs():
     np.testing.assert_array_equal(outcome == Outcome.SEATED, seated)
 
 
-def test_the_map_is_of_closings_from_its_places():
-    found = placement(wire="P7", columns=8).capture
+@pytest.fixture(scope="module")
+def placed():
+    return placement(wire="P7", columns=8)
+
+
+def test_the_map_is_of_closings_from_its_places(placed):
+    found = placed.capture
     assert found.outcome.shape == (len(found.height), len(found.sideways)) == (2, 8)
     section = Section(load_clamp(), Cas())
     for (i, j), code in np.ndenumerate(found.outcome):
@@ -187,20 +192,13 @@ def test_a_pitched_wire_opens_by_its_lift_at_the_ends(final):
 
 def test_the_opening_of_a_yawed_wire_is_that_of_meshes(final):
     """Each splint moved out by its share just parts from the wire, by manifold3d's volumes."""
-    manifold3d = pytest.importorskip("manifold3d")
     yaw = 0.05
     opening, _ = close_on(final, "P6", np.array([[yaw, 0.0]]))
     solids = parts(final.clamp)
-
-    def body(name, T):
-        facets = mesh(solids[name], 1e-3)
-        data = manifold3d.Mesh64(np.array(facets.vertices), np.array(facets.faces, dtype=np.uint64))
-        return manifold3d.Manifold(data).transform(T[:3])
-
-    wire = body("P6", final.T_world("P6") @ rotation((0.0, 0.0, 1.0), yaw))
+    wire = manifold(solids["P6"], final.T_world("P6") @ rotation((0.0, 0.0, 1.0), yaw), 1e-3)
     needed = 0.0
     for name, up in (("P1", 1.0), ("P2", -1.0)):
-        still = body(name, final.T_world(name))
+        still = manifold(solids[name], final.T_world(name), 1e-3)
         low, high = -1.0, 5.0
         while high - low > 1e-3:
             middle = 0.5 * (low + high)
@@ -243,9 +241,7 @@ def test_a_clamp_that_does_not_close_catches_nothing():
         placement(replace(clamp, line=replace(clamp.line, conductor=None, diameter=3.0)))
 
 
-def test_figure_shows_the_counts():
-    found = placement(columns=8)
-    figure = capture_figure(found)
-    (legend,) = figure.legends
+def test_figure_shows_the_counts(placed):
+    (legend,) = capture_figure(placed).legends
     shown = [text.get_text() for text in legend.get_texts()]
-    assert f"seated ({found.capture.count(Outcome.SEATED)})" in shown
+    assert f"seated ({placed.capture.count(Outcome.SEATED)})" in shown

@@ -20,10 +20,10 @@ from clamp3d.clamp.section import EDGES, SIZE, B, D, Gaps, S, Section, U
 
 
 def test_an_optimiser_and_a_grid_agree() -> None:
-    """Four of the clamps that ``scripts/check-clamps`` takes hundreds of."""
-    score = check_clamps(4, 1)
+    """Two of the clamps that ``scripts/check-clamps`` takes hundreds of."""
+    score = check_clamps(2, 1)
     assert score.findings == []
-    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 4
+    assert score.asked["optimiser without play"] == score.asked["optimiser with play"] == 2
     assert score.asked["equilibria named"] == 1
 
 
@@ -42,21 +42,6 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
     if not joints.saddle:
         assert list(on_saddle) == [EDGES]
         assert final.q[U] > 3.0
-
-
-def test_gradients_agree_with_differences_where_joints_have_play_and_wires_leave_the_faces() -> None:
-    rng = np.random.default_rng(16)
-    clamp = replace(load_clamp(), joints=Joints(hole=True, saddle=True, washer=True))
-    section, h = Section(clamp, Cas()), 1e-6
-    for side in (0.0, 40.0):
-        for _ in range(10):
-            q = section.open_state(26.0, 0.05)
-            q += np.array([-side, 0.0, side, *[0.0] * (SIZE - 3)]) + 0.3 * rng.normal(size=SIZE)
-            gaps = section.gaps(q)
-            numeric = [
-                (section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2.0 * h) for e in np.eye(SIZE)
-            ]
-            assert np.allclose(np.array(numeric).T, gaps.gradient, atol=2e-6)
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_any_open_start_ends_in_the_same_state(clamp):
     known = solve_final_state(section).q
     rng = np.random.default_rng(20)
     limit = clamp.tilt_stop
-    for _ in range(20):
+    for _ in range(6):
         start = section.open_state(section.open_distance() + rng.uniform(0.0, 60.0), rng.uniform(-limit, limit))
         start[:4] += rng.uniform(-5.0, 5.0, 4)
         gaps = section.gaps(start)
@@ -114,16 +114,16 @@ def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
     assert steps[1e-3] > steps[0.05] > solve_stepped(section, step=STEP, tilt_step=TILT_STEP).motion_steps
 
 
-def test_gradients_agree_with_differences(clamp):
-    rng = np.random.default_rng(3)
-    for model in (Cas(), Chords(math.radians(7.0))):
-        section = Section(clamp, model)
-        for _ in range(20):
-            q = section.open_state(26.0, 0.05) + np.concatenate([rng.normal(size=6), [0.0] * 4])
-            gaps = section.gaps(q)
-            h = 1e-6
-            numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2 * h) for e in np.eye(SIZE)]
-            assert np.allclose(np.array(numeric).T, gaps.gradient, atol=1e-6)
+@pytest.mark.parametrize(("model", "aside"), [(Cas(), 0.0), (Cas(), 40.0), (Chords(math.radians(7.0)), 0.0)])
+def test_gradients_agree_with_differences(clamp, model, aside):
+    """Where joints have play, and where wires have left the faces."""
+    rng, h = np.random.default_rng(16), 1e-6
+    section = Section(replace(clamp, joints=Joints(hole=True, saddle=True, washer=True)), model)
+    for _ in range(6):
+        q = section.open_state(26.0, 0.05) + 0.3 * rng.normal(size=SIZE)
+        q[[0, 2]] += -aside, aside
+        numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2.0 * h) for e in np.eye(SIZE)]
+        assert np.allclose(np.array(numeric).T, section.gaps(q).gradient, atol=2e-6)
 
 
 def test_curvatures_agree_with_differences_of_gradients(clamp):
@@ -164,7 +164,7 @@ def test_a_face_ends_at_the_splints_outer_edge(clamp, beyond, above, splint):
 
 def test_pairs_of_conductors_end_in_a_stated_result():
     """The thinnest, the thickest and a spread of others: what the status says is what the contacts are."""
-    names = list(catalogue())[::15]
+    names = list(catalogue())[::17]
     stated = set()
     for k, (line, jumper) in enumerate(itertools.product(names, names)):
         run = assemble(load_clamp(line=line, jumper=jumper), Cas())
@@ -184,33 +184,6 @@ def test_pairs_of_conductors_end_in_a_stated_result():
             assert any(abs(m.tilt - run.tilt) <= 1e-5 for m in low), (line, jumper, run.closing)
         stated.add(run.status.split(",")[0])
     assert {"clamped", "not clamped: faces meet"} <= stated
-
-
-@pytest.mark.parametrize(("line", "jumper"), [("LJ-500", "LJ-150"), ("LGJ-240/40", "LGJ-95/15"), ("LJ-300", "LJ-400")])
-def test_no_closer_state_exists_by_brute_force(line, jumper):
-    # Arc against arc: a wire of radius r fits between two arcs of radius R iff their centres are <= 2 (R - r) apart.
-    clamp = load_clamp(line=line, jumper=jumper)
-    section = Section(clamp, Cas())
-    found = solve_final_state(section)
-    up, down = clamp.up_splint, clamp.down_splint
-
-    def least_d(tilt: float) -> float:
-        least = -math.inf
-        for side, wire, top, bottom in (
-            (-1, clamp.line, up.line_groove, down.line_groove),
-            (1, clamp.jumper, up.jumper_groove, down.jumper_groove),
-        ):
-            c, s = math.cos(tilt), math.sin(tilt)
-            u, v = side * bottom.offset, bottom.centre_depth
-            across = (u * c + v * s) - side * top.offset
-            reach = 2.0 * (top.radius - wire.radius)
-            # P2's arc centre stands above P1's: top.centre_depth - (d - u s + v c) <= sqrt(reach^2 - across^2)
-            least = max(least, top.centre_depth - math.sqrt(reach**2 - across**2) + u * s - v * c)
-        return least
-
-    scan = min(least_d(t) for t in np.linspace(-clamp.tilt_stop, clamp.tilt_stop, 20001))
-    assert found.q[4] == pytest.approx(scan, abs=2e-3)
-    assert found.q[4] <= scan + 1e-9
 
 
 def test_a_start_that_overlaps_is_refused(clamp):

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from orders import manifold
 from random_clamps import whole_clamp
 
 from clamp3d.baselines.cas import Cas
@@ -17,24 +18,15 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.ways import Insertion
 from clamp3d.errors import SequenceError
-from clamp3d.geometry.meshing import mesh
 from clamp3d.output.report import make_report
 
-manifold3d = pytest.importorskip("manifold3d")
-
-MESH_ERROR = 0.01
 SCREW = ("P4", "P5")  # one diameter, so facets overlap all around
 TOUCHING = 5.0  # mm3 that facets of parts in contact overlap by; a sheet of 0.01 mm between two parts' ends is more
 
 
 @cache
 def bodies():
-    made = {}
-    for name, part in parts(load_clamp()).items():
-        facets = mesh(part, MESH_ERROR)
-        data = manifold3d.Mesh64(np.array(facets.vertices), np.array(facets.faces, dtype=np.uint64))
-        made[name] = manifold3d.Manifold(data)
-    return made
+    return {name: manifold(part, np.eye(4)) for name, part in parts(load_clamp()).items()}
 
 
 def volume(a, T_a, b, T_b):
@@ -60,7 +52,7 @@ def at(T, offset):
     return moved
 
 
-def overlaps_on(path, steps=4):
+def overlaps_on(path, steps=3):
     """Largest volume that two parts share anywhere on a path, looked at in ``steps`` instants of each stretch."""
     worst = 0.0
     for before, after in itertools.pairwise(path):

@@ -19,22 +19,14 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ("thickness = 27.7260", "", "up_splint.thickness is missing"),
         ("thickness = 27.7260", "thicknes = 27.7260", "up_splint.thicknes is not a known key; did you mean thickness?"),
         ("radius = 23.8012", "radius = -23.0", "up_splint.line_groove.radius: must be at least 1e-06, got -23.0"),
-        ("radius = 23.8012", "radius = 0", "up_splint.line_groove.radius: must be at least 1e-06, got 0"),
         ("radius = 23.8012", 'radius = "23 mm"', "up_splint.line_groove.radius: must be a valid number, got '23 mm'"),
         ("radius = 23.8012", "radius = nan", "up_splint.line_groove.radius: must be a finite number"),
         ("radius = 23.8012", "radius = true", "up_splint.line_groove.radius: must be a valid number, got True"),
-        ("radius = 23.8012", "radius = 20.0", "up_splint.line_groove: the arc does not reach its face"),
         ("offset = 46.0349", "offset = 60.0", "the arc leaves the splint at its edge: offset must be <= 57.4"),
-        ("offset = 46.0349", "offset = 15.0", "the arc meets the bolt hole: offset must be >= 22.08"),
-        ("thickness = 27.7260", "thickness = 40.0", "the arc leaves the splint at its edge"),
-        ("slot_width = 42.0", "slot_width = 40.0", "down_splint.max_tilt_deg must be <= 12.6"),
-        ("hole_diameter = 22.0", "hole_diameter = 20.0", "up_splint.hole_diameter must be > bolt.diameter = 20 mm"),
-        ("radius = 49.230", "radius = 47.0", "saddle.radius must be > down_splint.back_radius = 48 mm, got 47"),
         ("max_tilt_deg = 12.8", "max_tilt_deg = 13.0", "must be <= 12.99, where the saddle's edge stops the tilt"),
         ('conductor = "LJ-630"', 'conductor = "LJ-631"', "line.conductor: unknown conductor 'LJ-631'; nearest: LJ-630"),
         ('conductor = "LJ-630"', "", "line.conductor or diameter: give one of them"),
         ("P4 = 2, P5", "P4 = 4, P5", "connections.P1.P4: must be 0, 1, 2 or 3, got 4"),
-        ("P5 = 2, P6", "P5 = 9, P6", "connections.P1.P5: must be 0, 1, 2 or 3, got 9"),
         ("P4 = { P5 = 1 }", "P4 = { P5 = -1 }", "connections.P4.P5: must be 0, 1, 2 or 3, got -1"),
         ("P4 = 2, P5", "P9 = 2, P5", "connections.P1.P9: must be 'P1', 'P2'"),
         ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
@@ -81,13 +73,6 @@ def test_catalogue_is_complete():
     assert len(catalogue()) == 51
     assert conductor("Pigeon").diameter == 12.75
     assert all(0 < c.diameter < 50 and c.standard and c.source for c in catalogue().values())
-
-
-def test_the_reference_is_symmetric_in_its_connection_matrix():
-    clamp = load_clamp()
-    assert clamp.connection("P6", "P1") == clamp.connection("P1", "P6") == 3
-    assert clamp.connection("P1", "P2") == 0
-    assert clamp.connection("P5", "P4") == 1
 
 
 def test_the_round_back_stands_on_the_saddle_as_published():

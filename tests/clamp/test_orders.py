@@ -6,9 +6,6 @@ import os
 
 import numpy as np
 import pytest
-
-pytest.importorskip("manifold3d")
-
 from orders import MOVING, has_way, open_bodies, possible, questions
 
 from clamp3d.clamp.assemble import assemble

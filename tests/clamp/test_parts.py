@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import dblquad, quad
 
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
@@ -22,62 +19,6 @@ from clamp3d.geometry.profile import Arc, Profile
 
 CLAMP = load_clamp()
 REFERENCE = parts(CLAMP)
-
-
-def _thickness_up(x: float) -> float:
-    """Height of P1's material at x from its left edge, written from the published dimensions alone."""
-    groove = next((c for c in (68.5 - 46.0349, 68.5 + 49.8315) if abs(x - c) < 23.8012), None)
-    if groove is None:
-        return 27.7260
-    return min(27.7260, 48.7901 - math.sqrt(23.8012**2 - (x - groove) ** 2))
-
-
-def _height_down(x: float) -> float:
-    """Height of P2's material at x right of the bolt axis."""
-    back = 48.0 * math.sin(math.radians(40.0))
-    bottom = math.sqrt(48.0**2 - x * x) if abs(x) < back else 48.0 * math.cos(math.radians(40.0))
-    top = 24.5505
-    for centre, depth in ((-46.0349, 3.4624), (49.8315, 4.9057)):
-        if abs(x - centre) < 23.8012:
-            top = max(top, depth + math.sqrt(23.8012**2 - (x - centre) ** 2))
-    return bottom - top
-
-
-def _integral(f: Callable[[float], float], low: float, high: float, breaks: list[float]) -> float:
-    edges = [low, *sorted(breaks), high]
-    return sum(quad(f, a, b, epsabs=1e-10, epsrel=1e-13)[0] for a, b in itertools.pairwise(edges))
-
-
-def test_up_splint_volume_is_its_height_integrated() -> None:
-    mouth = math.sqrt(23.8012**2 - (48.7901 - 27.7260) ** 2)
-    breaks = [c + s * mouth for c in (68.5 - 46.0349, 68.5 + 49.8315) for s in (-1, 1)]
-    expected = 60.0 * _integral(_thickness_up, 0.0, 137.0, breaks) - math.pi * 11.0**2 * 27.7260
-    assert REFERENCE["P1"].volume == pytest.approx(expected, rel=1e-11)
-
-
-def test_down_splint_volume_is_its_height_integrated() -> None:
-    back = 48.0 * math.sin(math.radians(40.0))
-    breaks = [-back, back]
-    for centre, depth in ((-46.0349, 3.4624), (49.8315, 4.9057)):
-        mouth = math.sqrt(23.8012**2 - (24.5505 - depth) ** 2)
-        breaks += [centre - mouth, centre + mouth]
-    expected = 60.0 * _integral(_height_down, -68.5, 68.5, breaks)
-    expected -= 22.0 * _integral(_height_down, -21.0, 21.0, [])
-    assert REFERENCE["P2"].volume == pytest.approx(expected, rel=1e-11)
-
-
-def test_saddle_volume_is_its_height_integrated_outside_the_hole() -> None:
-    bottom = 49.230 + 12.19
-
-    def height(_: float, x: float) -> float:
-        return bottom - math.sqrt(49.230**2 - x * x)
-
-    def rim(x: float) -> float:
-        return math.sqrt(121 - x * x)
-
-    drilled, _ = dblquad(height, -11, 11, lambda x: -rim(x), rim, epsabs=1e-9, epsrel=1e-12)
-    whole = 60.0 * quad(lambda x: height(0.0, x), -22, 22, epsabs=1e-10)[0]
-    assert REFERENCE["P3"].volume == pytest.approx(whole - drilled, rel=1e-11)
 
 
 def test_bolt_nut_and_wires_are_textbook_solids() -> None:
@@ -103,7 +44,7 @@ def test_bounds_are_the_published_sizes() -> None:
         np.testing.assert_allclose(REFERENCE[name].bounds, box, atol=1e-12)
 
 
-@pytest.mark.parametrize("mesh_error", [5.0, 0.5, 0.01, 1e-4])
+@pytest.mark.parametrize("mesh_error", [0.5, 1e-4])
 @pytest.mark.parametrize("name", PARTS)
 def test_mesh_is_closed_and_within_its_computed_volume_error(name: str, mesh_error: float) -> None:
     part = REFERENCE[name]
@@ -123,7 +64,7 @@ def test_mesh_is_closed_and_within_its_computed_volume_error(name: str, mesh_err
         assert solid.volume == pytest.approx(extreme, rel=1e-12)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=15)
 @given(radius=st.floats(5.0, 25.0), depth=st.floats(-0.9, 0.95), gap=st.floats(0.0, 30.0), error=st.floats(1e-3, 2.0))
 def test_other_grooves_major_arcs_too_give_closed_meshes(radius: float, depth: float, gap: float, error: float) -> None:
     """Depth is the centre below the face in radii: a negative one is an arc of more than 180 degrees."""

@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,16 +8,6 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.sequence import parse_sequence
 from clamp3d.errors import InputError
-
-
-def test_the_papers_sequence():
-    steps = parse_sequence("P1|P2P3P4P5 → P7 -> P2 -> P5|P3P4")
-    assert [(s.part, s.followers) for s in steps] == [
-        ("P1", ("P2", "P3", "P4", "P5")),
-        ("P7", ()),
-        ("P2", ()),
-        ("P5", ("P3", "P4")),
-    ]
 
 
 @pytest.mark.parametrize(
@@ -40,10 +29,6 @@ def test_the_papers_sequence():
 def test_a_sequence_that_closes_no_clamp_is_refused(text, message):
     with pytest.raises(InputError, match=message):
         parse_sequence(text)
-
-
-def test_a_third_of_a_millimetre_is_48_degrees_of_an_m20_nut():
-    assert math.degrees(load_clamp().bolt.turn(1.0 / 3.0)) == pytest.approx(48.0)
 
 
 def test_every_step_ends_at_a_contact_that_is_declared():
