@@ -27,7 +27,7 @@ from clamp3d.clamp.section import HELD, B, D, S, Section, W
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import SolverError
 
 STEP = 1.0 / 3.0
 """Move along the bolt of the paper's program in mm (derived from its Table 4)."""
@@ -35,9 +35,6 @@ TILT_STEP = math.radians(1.0)
 """Turn of the paper's program in rad (derived from its Table 4)."""
 RESOLUTION = 1e-3
 """Where bisection stops, mm."""
-
-_WIDEST = 1000.0
-"""The most that a clamp is opened further than it needs, mm: descents are short."""
 
 
 class Options(TypedDict, total=False):
@@ -47,8 +44,6 @@ class Options(TypedDict, total=False):
     solver: Solver
     step: float
     tilt_step: float
-    open_by: float
-    open_tilt: float
     others: bool
     on_waypoint: Callable[[Waypoint], None] | None
     progress: Callable[[int, float], None] | None
@@ -62,19 +57,14 @@ class _Settings:
     solver: Solver = "exact"
     step: float = STEP
     tilt_step: float = TILT_STEP
-    open_by: float = 0.0
-    open_tilt: float = 0.0
     others: bool = False
     on_waypoint: Callable[[Waypoint], None] | None = None
     progress: Callable[[int, float], None] | None = None
 
     def __post_init__(self) -> None:
         choice("solver", self.solver, ("exact", "stepped", "bisection"))
-        for name in ("step", "tilt_step", "open_by", "open_tilt"):
-            title = "tilt step" if name == "tilt_step" else name
-            object.__setattr__(self, name, number(title, getattr(self, name)))
-        if not 0.0 <= self.open_by <= _WIDEST:
-            raise InputError(f"open_by must be between 0 and {_WIDEST:g} mm, got {self.open_by:g}")
+        object.__setattr__(self, "step", number("step", self.step))
+        object.__setattr__(self, "tilt_step", number("tilt step", self.tilt_step))
         function("on_waypoint", self.on_waypoint)
         function("progress", self.progress)
 
@@ -108,8 +98,6 @@ def assemble(
         How the closed position is found.
     step, tilt_step : float
         Moves of the stepped solver, and the first ones of bisection; mm and rad.
-    open_by, open_tilt : float
-        How much further than needed the clamp stands open before it comes in; mm and rad.
     others : bool
         Also find the other states that closing can end in, and the distance with the joints' play (exact solver only).
     on_waypoint : callable, optional
@@ -172,7 +160,7 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
         violation=proven.violation if proven else None,
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
-        start=Start(float(q[D]), settings.open_tilt, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
+        start=Start(float(q[D]), 0.0, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
         forces=contact_forces(section, proven) if proven else (),
         others=_others(section, proven) if proven and settings.others else None,
         with_play=_with_play(section, proven) if proven and settings.others else None,
@@ -181,22 +169,21 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
 
 def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState | SteppedState]:
     """Close the clamp: the states on the way, and the last one."""
-    opened = section.open_state(section.open_distance() + settings.open_by, settings.open_tilt)
-    start = open_start(section, opened)
+    start = open_start(section)
     if settings.solver == "exact":
         met: Meetings = []
         final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
         met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
         by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
         taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-        return Closing(opened, start, final.held, final.q, by_hand, taken), final
+        return Closing(start, final.held, final.q, by_hand, taken), final
     moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
     stepped = (
         solve_stepped(section, **moves)
         if settings.solver == "stepped"
         else solve_bisection(section, resolution=RESOLUTION, **moves)
     )
-    return Closing(opened, start, stepped.q, stepped.q, [], []), stepped
+    return Closing(start, stepped.q, stepped.q, [], []), stepped
 
 
 def _add_silent_contacts(

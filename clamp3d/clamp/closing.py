@@ -46,12 +46,9 @@ _NONE = 1e-12
 """What is left of a distance of 1 where there is no step."""
 
 
-def open_start(section: Section, opened: Array | None = None) -> Array:
-    """Where every closing begins: the clamp wide open, the up splint resting on the line, the jumper in its groove.
-
-    ``opened`` (10,) is how the clamp comes in, `Section.open_state` at `Section.open_distance` by default.
-    """
-    q = section.seated(section.open_state(section.open_distance()) if opened is None else opened)
+def open_start(section: Section) -> Array:
+    """Where every closing begins: the clamp wide open, the up splint resting on the line, the jumper in its groove."""
+    q = section.seated(section.open_state(section.open_distance()))
     for y in (1, 3):
         q = descend(section, q, np.eye(SIZE)[y], free=(y,))
     return q

@@ -162,14 +162,12 @@ def open_up(section: Section, q: Array, step: float) -> Array | None:
 
 def _best(section: Section, q: Array, start: Array, held: Array) -> FinalState:
     """The state at the end of a path, with the active set that proves it best."""
-    best = None
+    states: list[FinalState] = []
     for active in _ACTIVE_TRIES:
-        state = _certify(section, q, start, held, active)
-        best = state if best is None else min(best, state, key=lambda one: one.residual)
-        if best.residual <= TOLERANCE:
+        states.append(_certify(section, q, start, held, active))
+        if states[-1].residual <= TOLERANCE:
             break
-    assert best is not None
-    return best
+    return min(states, key=lambda state: state.residual)
 
 
 def _certify(section: Section, q: Array, start: Array, held: Array, active: float) -> FinalState:

@@ -10,7 +10,7 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.path import Log
 from clamp3d.clamp.plan import Plan
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import D
+from clamp3d.clamp.section import D, Section
 from clamp3d.clamp.sequence import Step, as_published
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, corners
 from clamp3d.geometry.pose import Array
@@ -22,10 +22,9 @@ Meetings = list[tuple[Pair, Array]]
 
 @dataclass(frozen=True)
 class Closing:
-    """What the solver found: the states wide open, at the start, closed by hand and at the end, and the contacts on the
-    way, by hand and where the nut takes up the joints' play."""
+    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way, by
+    hand and where the nut takes up the joints' play."""
 
-    opened: Array
     start: Array
     held: Array
     end: Array
@@ -84,9 +83,14 @@ def _bring(plan: Plan, k: int, log: Log) -> None:
     log.touch(step.name, sorted((min(pair), max(pair)) for pair in pairs), base, travel, within=CONTACT)
 
 
+def _opened(section: Section) -> Array:
+    """The state in which the clamp comes in, the wires in the middle between the splints."""
+    return section.open_state(section.open_distance())
+
+
 def _approach_line(step: str, closing: Closing, log: Log) -> None:
     """The open clamp comes in from the right until the line lies under its groove, then settles on the line."""
-    section, opened, start = log.section, closing.opened, closing.start
+    section, start, opened = log.section, closing.start, _opened(log.section)
     clamp = section.clamp
     beside, over, settled = opened.copy(), opened.copy(), opened.copy()
     middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
@@ -108,10 +112,10 @@ def _approach_line(step: str, closing: Closing, log: Log) -> None:
 def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
     """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
     inside, placed = closing.start.copy(), log.section.poses(closing.start)
-    inside[3] = closing.opened[3]
+    inside[3] = _opened(log.section)[3]
     log.reach(step, "jumper between the splints", log.section.poses(inside))
     log.reach(step, "jumper in the up splint's groove", placed)
-    log.touch(step, [("P1", "P7")], placed, float(closing.opened[3] - closing.start[3]))
+    log.touch(step, [("P1", "P7")], placed, float(inside[3] - closing.start[3]))
 
 
 def _close_splints(step: str, closing: Closing, log: Log) -> None:

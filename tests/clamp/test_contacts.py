@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,15 +15,11 @@ from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.matrix import PAIRS
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.surfaces import SURFACES, surfaces_at
 from clamp3d.cli import group
 from clamp3d.engine.distance import measure
-from clamp3d.geometry.pose import Array, inverse
-from clamp3d.geometry.shapes import Solid
-from clamp3d.testing import body
 
 WIRES = [("LJ-630", "LJ-120"), ("LJ-16", "LJ-16"), ("LJ-500", "LJ-400"), (46.0, 14.0), (9.0, 40.0)]
 
@@ -33,42 +28,6 @@ WIRES = [("LJ-630", "LJ-120"), ("LJ-16", "LJ-16"), ("LJ-500", "LJ-400"), (46.0, 
 def assembly(request: pytest.FixtureRequest) -> Assembly:
     line, jumper = request.param
     return assemble(line=line, jumper=jumper)
-
-
-def outside(solid: Solid, point: Array) -> float:
-    """How far a point is from the material at least, mm."""
-    return max(0.0, float(body(solid).field(point[None])[0]))
-
-
-def test_nearest_points_lie_on_both_parts_and_are_the_distance_apart(assembly: Assembly) -> None:
-    solids = parts(assembly.clamp)
-    assert [(c.a, c.b) for c in assembly.contacts] == list(PAIRS)
-    for c in assembly.contacts:
-        d = c.distance
-        assert d.point_a is not None
-        assert d.point_b is not None
-        for part, point in ((c.a, d.point_a), (c.b, d.point_b)):
-            local = inverse(assembly.T_world(part)) @ [*point, 1.0]
-            assert outside(solids[part], local[:3]) <= 1e-6, (c.a, c.b, part)
-        if c.gap >= 0.0:
-            assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(c.gap, abs=1e-6), (c.a, c.b)
-        if d.normal is not None:
-            assert np.linalg.norm(d.normal) == pytest.approx(1.0, abs=1e-9)
-
-
-def test_every_way_to_ask_gives_the_same_distance(assembly: Assembly, tmp_path: Path) -> None:
-    out = tmp_path / "run.json"
-    clamp = assembly.clamp
-    wires = [w.conductor or f"{w.diameter}" for w in (clamp.line, clamp.jumper)]
-    CliRunner().invoke(
-        group, ["run", "-q", "--no-equilibria", "--line", wires[0], "--jumper", wires[1], "--json", str(out)]
-    )
-    rows = {(row["a"], row["b"]): row for row in json.loads(out.read_text())["contacts"]}
-    measured = measure(assembly.scene)
-    assert list(rows) == list(measured) == list(PAIRS)
-    for c in assembly.contacts:
-        assert rows[c.a, c.b]["distance_mm"] == pytest.approx(c.gap, abs=1e-9)
-        assert measured[c.a, c.b].value == pytest.approx(c.gap, abs=1e-9)
 
 
 def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(assembly: Assembly) -> None:
