@@ -8,7 +8,7 @@ its tilt multiples of ``tilt_step``, the wires settle freely, and the first posi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -61,15 +61,12 @@ def solve_stepped(
     first = math.ceil(start / step)
     q, tilt, tried = section.open_state(first * step), 0, 0
     for k in range(first, -_MOVES, -1):
-        found = None
-        for candidate in sorted(tilts, key=lambda i: (abs(i - tilt), abs(i))):
-            tried += 1
-            found = _place(section, q, k * step, candidate * tilt_step)
-            if found is not None:
-                break
-        if found is None:
+        nearest = sorted(tilts, key=lambda i: (abs(i - tilt), abs(i)))
+        lower, tries = _first_free(section, q, k * step, [i * tilt_step for i in nearest])
+        tried += tries
+        if lower is None:
             break
-        q, tilt = found, candidate
+        q, tilt = lower, round(float(lower[S]) / section.lever / tilt_step)
         if progress is not None:
             progress(tried, k * step)
     if k == first:
@@ -99,21 +96,30 @@ def solve_bisection(
     limit = section.clamp.tilt_stop
     while step > resolution:
         step, tilt_step = 0.5 * step, 0.5 * tilt_step
-        found: Array | None = q
-        while found is not None:
-            q, found = found, None
-            tilt, turn = float(q[S]) / section.lever, 0.0
-            while found is None and turn <= 2.0 * limit:
-                # A move down may need a turn of many tilt steps: those of twice the size are next.
-                for candidate in {tilt + turn: None, tilt - turn: None}:
-                    if found is None and abs(candidate) <= limit:
-                        tried += 1
-                        found = _place(section, q, float(q[D]) - step, candidate, settle=True)
-                turn = max(tilt_step, 2.0 * turn)
-            if found is not None and progress is not None:
-                progress(tried, float(found[D]))
+        # A move down may need a turn of many tilt steps: those of twice the size are next.
+        turns = [0.0, *(tilt_step * 2.0**k for k in range(math.floor(math.log2(2.0 * limit / tilt_step)) + 1))]
+        lower: Array | None = q
+        while lower is not None:
+            q, tilt = lower, float(lower[S]) / section.lever
+            tilts = dict.fromkeys(tilt + side * turn for turn in turns for side in (1.0, -1.0))
+            allowed = [candidate for candidate in tilts if abs(candidate) <= limit]
+            lower, tries = _first_free(section, q, float(q[D]) - step, allowed, settle=True)
+            tried += tries
+            if lower is not None and progress is not None:
+                progress(tried, float(lower[D]))
     q = section.seated(q)
     return SteppedState(q, section.gaps(q), tried)
+
+
+def _first_free(
+    section: Section, q: Array, d: float, tilts: Sequence[float], settle: bool = False
+) -> tuple[Array | None, int]:
+    """The state with the down splint at ``d`` and the first tilt that is free, or None; and how many were tried."""
+    for tried, tilt in enumerate(tilts, 1):
+        state = _place(section, q, d, tilt, settle)
+        if state is not None:
+            return state, tried
+    return None, len(tilts)
 
 
 def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = False) -> Array | None:
