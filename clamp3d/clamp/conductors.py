@@ -46,8 +46,8 @@ def conductor(designation: str) -> Conductor:
     Traceback (most recent call last):
     clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-210, LJ-120, LJ-25 (all 51: clamp3d conductors)
     """
-    found = _folded().get(designation.strip().casefold())
-    if found is None:
+    entry = _folded().get(designation.strip().casefold())
+    if entry is None:
         import difflib
 
         near = difflib.get_close_matches(designation, catalogue(), n=3, cutoff=0.0)
@@ -55,4 +55,4 @@ def conductor(designation: str) -> Conductor:
             f"unknown conductor {designation!r}; nearest: {', '.join(near)} "
             f"(all {len(catalogue())}: clamp3d conductors)"
         )
-    return found
+    return entry

@@ -52,7 +52,7 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     [31.638, 31.53]
     """
     instance("section", section, Section)
-    found: list[FinalState] = []
+    states: list[FinalState] = []
     last: SolverError | None = None
     for start in initial_guesses(section):
         try:
@@ -60,13 +60,13 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
         except SolverError as error:
             last = error
             continue
-        if not any(same(state, other) for other in found):
-            found.append(state)
-    if not found:
+        if not any(same(state, other) for other in states):
+            states.append(state)
+    if not states:
         if last is not None:
             raise SolverError(f"no equilibrium could be proven; the last start says: {last}")
-        found.append(solve_final_state(section))
-    return tuple(sorted(found, key=lambda state: float(state.q[D])))
+        states.append(solve_final_state(section))
+    return tuple(sorted(states, key=lambda state: float(state.q[D])))
 
 
 def same(a: FinalState, b: FinalState) -> bool:

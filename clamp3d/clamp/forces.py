@@ -60,15 +60,15 @@ def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:
     [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
     """
     q, gaps = final.q, final.gaps
-    found, total = [], 0.0
+    forces, total = [], 0.0
     for k in np.flatnonzero(final.multipliers):
         (a, b), push = gaps.pair[k], float(final.multipliers[k])
-        found.append(world_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
+        forces.append(world_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
         total += push * gaps.normal[k, 0] * ((b == "P2") - (a == "P2"))
     if not section.clamp.joints.saddle and abs(total) > 1e-9:
         down = section.down_splint(q)
-        found.append(world_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
-    return tuple(found)
+        forces.append(world_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
+    return tuple(forces)
 
 
 def world_force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:

@@ -64,27 +64,27 @@ def load_clamp(
         if "parts" in data or "include" in data:
             raise InputError(f"{origin}: is a scene, not a clamp: give it to check, view, report or export")
         clamp = validate(Clamp, data, origin)
-    wires = {key: wire(given, key) for key, given in (("line", line), ("jumper", jumper)) if given is not None}
+    wires = {key: wire(size, key) for key, size in (("line", line), ("jumper", jumper)) if size is not None}
     if wires:
         clamp = validate(Clamp, {f.name: getattr(clamp, f.name) for f in fields(clamp)} | wires, origin)
     return clamp
 
 
-def wire(given: WireSize, name: str = "wire") -> Wire:
+def wire(size: WireSize, name: str = "wire") -> Wire:
     """A wire by catalogue name, or by its diameter in mm as a number or as text. Raises InputError."""
-    diameter = checks.real(given)
+    diameter = checks.real(size)
     if diameter is None:
-        if not isinstance(given, str):
-            raise InputError(f"{name} must be a conductor's name or a diameter in mm, got {checks.shown(given)}")
+        if not isinstance(size, str):
+            raise InputError(f"{name} must be a conductor's name or a diameter in mm, got {checks.shown(size)}")
         try:
-            diameter = float(given)
+            diameter = float(size)
         except ValueError:
-            return Wire(conductor=conductor(given).designation)
+            return Wire(conductor=conductor(size).designation)
     try:
         return Wire(diameter=diameter)
     except InputError:
         raise InputError(
-            f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(str(given), 40)}"
+            f"{name} diameter must be > 0 (at least {SMALLEST:g}) and < 100000 mm, got {checks.short(str(size), 40)}"
         ) from None
 
 

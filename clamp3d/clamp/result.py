@@ -277,15 +277,15 @@ class Assembly:
         """What a reviewer has to know, the worst first; every report prints this list."""
         overlaps = {text: c for c in self.contacts if (text := overlap(c))}
         why = next((c for text, c in overlaps.items() if self.status.endswith(text)), None)
-        found = [] if self.clamped else [Finding("error", self.status, *((why.a, why.b) if why else ()))]
-        found += [Finding("error", text, c.a, c.b) for text, c in overlaps.items() if c is not why]
-        found += [Finding("error", str(d), d.a, d.b) for d in self.undeclared]
-        found += [Finding("warning", text) for text in self.closing_status.warnings]
+        findings = [] if self.clamped else [Finding("error", self.status, *((why.a, why.b) if why else ()))]
+        findings += [Finding("error", text, c.a, c.b) for text, c in overlaps.items() if c is not why]
+        findings += [Finding("error", str(d), d.a, d.b) for d in self.undeclared]
+        findings += [Finding("warning", text) for text in self.closing_status.warnings]
         for d in self.matrix_differences:
             if d.declared != 0:
-                found.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
-        found += [Finding("note", str(e)) for e in self.others or ()]
-        return tuple(sorted(found, key=lambda finding: get_args(Severity).index(finding.severity)))
+                findings.append(Finding("warning" if d.declared == 3 or d.measured else "note", str(d), d.a, d.b))
+        findings += [Finding("note", str(e)) for e in self.others or ()]
+        return tuple(sorted(findings, key=lambda finding: get_args(Severity).index(finding.severity)))
 
     def T_world(self, part: PartName) -> Array:
         """Pose (4, 4) of a part in the world in the final state, lengths in mm."""

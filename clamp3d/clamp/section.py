@@ -257,13 +257,13 @@ class Section:
 
     def escaped(self, q: Array) -> tuple[PartName, ...]:
         """The wires whose centre is beside a splint: nothing leads them back."""
-        half, pose, found = self.clamp.down_splint.width / 2, self.down_splint(q), []
+        half, pose, escaped = self.clamp.down_splint.width / 2, self.down_splint(q), []
         for i, wire in enumerate(WIRES):
             x, y = float(q[2 * i]), float(q[2 * i + 1])
             u = (x - pose.x) * math.cos(pose.angle) - (y - pose.y) * math.sin(pose.angle)
             if not (0.0 <= x <= self.clamp.up_splint.width and abs(u) <= half):
-                found.append(wire)
-        return tuple(found)
+                escaped.append(wire)
+        return tuple(escaped)
 
     def open_state(self, d: float, tilt: float = 0.0) -> Array:
         """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres.

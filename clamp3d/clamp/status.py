@@ -114,14 +114,14 @@ def closing_status(section: Section, final: FinalState | SteppedState, resolutio
 
 def seats(section: Section, q: Array, resolution: float = TOUCHING) -> tuple[Seat, ...]:
     """Where each wire stands in each of its grooves; gaps up to ``resolution`` mm touch."""
-    exact, found = Section(section.clamp, Cas()), []
+    exact, places = Section(section.clamp, Cas()), []
     for splint, wire in itertools.product(SPLINTS, WIRES):
         gap, _ = _nearest(section.wire_gaps(q, wire), splint)
         _, feature = _nearest(exact.wire_gaps(q, wire), splint)
         touches = gap <= resolution
         detail = _DETAILS[feature] if touches else "loose"
-        found.append(Seat(splint, wire, touches and feature == "arc", gap, detail, feature, touches))
-    return tuple(found)
+        places.append(Seat(splint, wire, touches and feature == "arc", gap, detail, feature, touches))
+    return tuple(places)
 
 
 def _nearest(gaps: Gaps, splint: PartName) -> tuple[float, SeatFeature]:

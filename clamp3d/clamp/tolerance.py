@@ -158,10 +158,6 @@ def monte_carlo(
     progress : callable, optional
         Called with the samples done and ``n``.
 
-    Returns
-    -------
-    MonteCarlo
-
     Raises
     ------
     InputError

@@ -134,8 +134,8 @@ class Insertion:
 
     def blocks(self) -> tuple[Block, ...]:
         """What each straight way in meets first, the way that leads nearest to the place first."""
-        met = [self.block(origin, length + SPARE) for origin, length in self._exits(_HERE)]
-        return tuple(sorted(filter(None, met), key=lambda block: block.way - block.travel))
+        blocks = [self.block(origin, length + SPARE) for origin, length in self._exits(_HERE)]
+        return tuple(sorted(filter(None, blocks), key=lambda block: block.way - block.travel))
 
     def block(self, origin: str, length: float) -> Block | None:
         """What meets first on the straight way in from ``length`` mm away; None if it is free."""
@@ -144,8 +144,8 @@ class Insertion:
         if row is None:
             return None
         share = row.contact_at or 0.0
-        met = self._scene(self._solids, (1.0 - share) * start)
-        (pair,) = check(met, pairs=[(row.a, row.b)], distances=True, depths=False, cache=self.cache).pairs
+        contact = self._scene(self._solids, (1.0 - share) * start)
+        (pair,) = check(contact, pairs=[(row.a, row.b)], distances=True, depths=False, cache=self.cache).pairs
         point = pair.distance.point_b if pair.a == row.a else pair.distance.point_a
         return Block(origin, row.a, row.b, point, share * length, length)
 
