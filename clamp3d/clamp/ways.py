@@ -18,6 +18,7 @@ from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.parts import parts, wire_solid
 from clamp3d.clamp.section import WIRES
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
@@ -143,10 +144,13 @@ class Insertion:
         row = self._first_overlap(start, -start)
         if row is None:
             return None
-        share = row.contact_at or 0.0
+        pair = [(row.a, row.b)]
+        way = replace(self._scene(self._solids, start, -start), contact=TOUCHING)
+        (met,) = check(way, pairs=pair, depths=False, cache=self.cache).motions
+        share = met.contact_at or 0.0
         contact = self._scene(self._solids, (1.0 - share) * start)
-        (pair,) = check(contact, pairs=[(row.a, row.b)], distances=True, depths=False, cache=self.cache).pairs
-        point = pair.distance.point_b if pair.a == row.a else pair.distance.point_a
+        (there,) = check(contact, pairs=pair, distances=True, depths=False, cache=self.cache).pairs
+        point = there.distance.point_b if there.a == row.a else there.distance.point_a
         return Block(origin, row.a, row.b, point, share * length, length)
 
     def scene(self, block: Block) -> Scene:
