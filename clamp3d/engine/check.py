@@ -214,7 +214,7 @@ class _Questions:
             if key not in self._answers:
                 self._answers[key] = self._measured(a, b, T, start, allowance)
             if depth and key not in self._depths:
-                self._depths[key] = penetration(a, b, T, self._answers[key][1])
+                self._depths[key] = penetration(a, b, T, self._answers[key][1], fine=self.distances)
         except MissingLibraryError:
             raise
         except Exception as error:  # one pair that fails is a finding, not the end of all others

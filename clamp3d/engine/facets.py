@@ -5,16 +5,16 @@ The axis enters FCL as a triangle of no width, whose distance from other triangl
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, reduce
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.closed_form import ClosedForm
 from clamp3d.engine.convex import Rod
-from clamp3d.engine.surface import Surface, fcl_tree
-from clamp3d.geometry.pose import Array
+from clamp3d.engine.mesh_distance import nearest_points
+from clamp3d.engine.surface import Surface
+from clamp3d.geometry.pose import Array, to_source, to_target
 
 _WIDTH = 1e-9
 """Width (mm) of the triangle that stands for an axis."""
@@ -24,10 +24,7 @@ _SQUARE = 1e-7
 
 def rods_distance(mesh: Surface, bodies: tuple[ClosedForm, ...], T: Array) -> Distance:
     """Distance of bodies that a cylinder holds each, at ``T`` (4, 4) in the mesh's frame."""
-    nearest = Distance(np.inf, np.inf)
-    for body in bodies:
-        nearest = nearest.union(_rod_distance(mesh, body, T))
-    return nearest
+    return reduce(Distance.union, (_rod_distance(mesh, body, T) for body in bodies))
 
 
 def rod_of(body: ClosedForm) -> Rod | None:
@@ -38,45 +35,25 @@ def rod_of(body: ClosedForm) -> Rod | None:
 def _rod_distance(mesh: Surface, body: ClosedForm, T: Array) -> Distance:
     rod = rod_of(body)
     assert rod is not None
-    R, t = T[:3, :3], T[:3, 3]
-    axis_gap, lower, p, on_axis = _to_axis(mesh, rod, T)
-    slack = 1e-12 * (mesh.scale + float(np.abs(t).max()) + rod.length) + _WIDTH
-    ends = rod.ends @ R.T + t
-    if axis_gap <= slack or mesh.contains(ends[:1]).any():
+    lower, axis_gap, p, on_axis = nearest_points(mesh, _axis(rod), T)
+    slack = 1e-12 * (mesh.scale + float(np.abs(T[:3, 3]).max()) + rod.length) + _WIDTH
+    if axis_gap <= slack or mesh.contains(to_target(T, rod.ends[:1])).any():
         return Distance()  # the axis meets the part: the meshes say how deep
     lower -= rod.radius + slack
+    off = slack + (mesh.error if lower + rod.radius < axis_gap else 0.0)
+    if axis_gap < rod.radius:
+        depth = float(body.depth(to_source(T, p)[None])[0])
+        upper = off - depth if depth >= -slack else np.inf
+        return Distance(lower, max(lower, upper), p, p).widened(body.error)
     n = (p - on_axis) / axis_gap
     q = on_axis + rod.radius * n
-    off = mesh.error if lower + rod.radius < axis_gap else 0.0
-    if axis_gap < rod.radius:
-        deep = float(body.depth(((p - t) @ R)[None])[0])
-        upper = slack + off - deep if deep >= -slack else np.inf
-        return Distance(lower, max(lower, upper), p, p).widened(body.error)
     # Square to the axis the nearest point is on the side, which flat ends share with round ones.
-    on_side = abs(float(n @ R @ rod.T[:3, 2])) < _SQUARE and body.depth(((q - t) @ R)[None])[0] >= -slack
-    upper = axis_gap - rod.radius + off + slack if on_side else np.inf
-    return Distance(lower, upper, p if on_side else None, q if on_side else None).widened(body.error)
-
-
-def _to_axis(mesh: Surface, rod: Rod, T: Array) -> tuple[float, float, Array, Array]:
-    """Distance of the facets from the rod's axis, a lower bound of it for the true part, and the nearest points."""
-    import fcl
-
-    axis = fcl.CollisionObject(_axis(rod), fcl.Transform(T[:3, :3], T[:3, 3]))
-    best, lower, points = np.inf, np.inf, (np.zeros(3), np.zeros(3))
-    for tree, error in mesh.groups:
-        answer = fcl.DistanceResult()
-        request = fcl.DistanceRequest(enable_nearest_points=True)
-        d = float(fcl.distance(fcl.CollisionObject(tree), axis, request, answer))
-        lower = min(lower, max(d, 0.0) - error)
-        if d < best:
-            p, q = answer.nearest_points
-            best, points = d, (np.array(p, dtype=np.float64), np.array(q, dtype=np.float64))
-    return best, lower, *points
+    if abs(float(n @ T[:3, :3] @ rod.T[:3, 2])) < _SQUARE and body.depth(to_source(T, q)[None])[0] >= -slack:
+        return Distance(lower, axis_gap - rod.radius + off, p, q).widened(body.error)
+    return Distance(lower).widened(body.error)
 
 
 @lru_cache(maxsize=1024)
-def _axis(rod: Rod) -> Any:
-    """FCL's tree of the axis."""
-    corners = np.vstack([rod.ends, rod.ends[1:] + _WIDTH * rod.T[:3, 0]])
-    return fcl_tree(corners, np.array([[0, 1, 2]]))
+def _axis(rod: Rod) -> Surface:
+    """The axis as a triangle of no width."""
+    return Surface(np.vstack([rod.ends, rod.ends[1:] + _WIDTH * rod.T[:3, 0]]), np.array([[0, 1, 2]]))

@@ -14,14 +14,12 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
-from clamp3d.engine.overlap import common, deepest, thickness
-from clamp3d.engine.surface import Surface
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.engine.overlap import arrays_of, common, deepest, thickness
+from clamp3d.engine.surface import Surface, fcl_pair
+from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
 Enough = Callable[[Distance], bool]
 
-_MOST_POINTS = 400
-"""Vertices of a mesh, spread over it, that are tried as points inside another one."""
 _CUTS, _FEW_CUTS = 100_000, 2_000
 """Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much
 less where Open CASCADE can be asked instead.
@@ -57,11 +55,10 @@ def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     """Last point (3,) of a drawn solid at ``T`` (4, 4) on the way from a point of its inner mesh to one outside."""
     if model.bodies is None or not model.bracketed:
         return inside
-    R, t = T[:3, :3], T[:3, 3]
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        point = (inside + middle * (outside - inside) - t) @ R
+        point = to_source(T, inside + middle * (outside - inside))
         if max(float(body.depth(point[None])[0]) for body in model.bodies) >= 0.0:
             low = middle
         else:
@@ -72,40 +69,24 @@ def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
 def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int = _CUTS) -> Distance:
     """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
     rounding = rounding_of(a, b, T)
-    if surfaces_meet(a, b, T):
-        return _overlap(a, b, T, enough, cuts)
-    lower, upper, p, q = nearest_points(a, b, T)
-    if upper <= rounding:
-        return _overlap(a, b, T, enough, cuts)
-    if one_inside(a, b, T) or one_inside(b, a, inverse(T)):
-        return _overlap(a, b, T, enough, cuts)
-    local = (q - T[:3, 3]) @ T[:3, :3]
-    off = float(a.error_at(p[None])[0] + b.error_at(local[None])[0])
-    return Distance(lower - rounding, upper + off + rounding, p, q)
-
-
-def _overlap(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int) -> Distance:
-    """Bounds of the interference of two meshes of which one meets the other or lies inside it."""
-    rounding = rounding_of(a, b, T)
+    if not surfaces_meet(a, b, T):
+        lower, upper, p, q = nearest_points(a, b, T)
+        if upper > rounding and not (one_inside(a, b, T) or one_inside(b, a, inverse(T))):
+            off = float(a.error_at(p[None])[0] + b.error_at(to_source(T, q)[None])[0])
+            return Distance(lower - rounding, upper + off + rounding, p, q)
     off = a.error + b.error + rounding
-    vertex = _deepest_vertex(a, b, T)
-    if vertex is not None and -vertex.upper > 0.05 * min(float(np.ptp(s.box, axis=0).max()) for s in (a, b)):
-        return vertex  # so deep that neither where nor how deep matters for any verdict
     shared = common(a, b, T)
     if shared is None:
         return Distance(-off, off)
-    depth, deepest_point = deepest(a, b, T, shared)
-    point: Array | None = deepest_point
+    depth, point = deepest(a, b, T, shared)
     upper = rounding - depth
-    if vertex is not None and vertex.upper < upper:
-        upper, point = vertex.upper, vertex.point_a
 
     def of_thickness(bound: float) -> Distance:
         return Distance(-bound - off, max(upper, -bound - off), point, point)
 
     unbounded = Distance(-np.inf, upper, point, point)
     of_meshes = depth + a.error + b.error  # what was measured there: no bound of the meshes' overlap is less
-    if enough(unbounded) or not enough(of_thickness(max(0.0, -upper, of_meshes))):
+    if enough(unbounded) or not enough(of_thickness(max(0.0, of_meshes))):
         return unbounded
     return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound)), cuts))
 
@@ -113,19 +94,6 @@ def _overlap(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int) -> Dis
 def _nothing(_: Distance) -> bool:
     """Nothing is enough, and no upper bound of an overlap is asked for: the inner meshes attest depths alone."""
     return False
-
-
-def _deepest_vertex(a: Surface, b: Surface, T: Array) -> Distance | None:
-    """The deepest of some vertices of either mesh in the other, which attests a depth without the common part."""
-    best = None
-    for outer, inner, place, back in ((a, b, T, None), (b, a, inverse(T), T)):
-        points = inner.vertices[:: max(1, len(inner.vertices) // _MOST_POINTS)] @ place[:3, :3].T + place[:3, 3]
-        depth = outer.certain_depth(points) - inner.error - rounding_of(a, b, T)
-        k = int(np.argmax(depth))
-        if depth[k] > 0.0 and (best is None or -depth[k] < best.upper):
-            point = points[k] if back is None else back[:3, :3] @ points[k] + back[:3, 3]
-            best = Distance(-np.inf, -float(depth[k]), point, point)
-    return best
 
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:
@@ -139,9 +107,7 @@ def are_apart(a: Surface, b: Surface, T: Array) -> bool:
 
 def one_inside(outer: Surface, inner: Surface, T: Array) -> bool:
     """Whether a shell of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``; no surfaces may meet."""
-    points = inner.shell_points @ T[:3, :3].T + T[:3, 3]
-    boxed = ((points >= outer.box[0]) & (points <= outer.box[1])).all(axis=(1, 2))
-    return bool(boxed.any()) and bool(outer.contains(points[boxed, 0]).any())
+    return bool(outer.contains(to_target(T, inner.shell_points)).any())
 
 
 def rounding_of(a: Surface, b: Surface, T: Array) -> float:
@@ -153,22 +119,19 @@ def surfaces_meet(a: Surface, b: Surface, T: Array) -> bool:
     """Whether a triangle of ``a`` meets one of ``b``, placed by ``T`` (4, 4) in a's frame."""
     import fcl
 
-    place = fcl.Transform(T[:3, :3], T[:3, 3])
-    objects = fcl.CollisionObject(a.bvh, fcl.Transform()), fcl.CollisionObject(b.bvh, place)
-    return bool(fcl.collide(*objects, fcl.CollisionRequest(), fcl.CollisionResult()))
+    return bool(fcl.collide(*fcl_pair(a.bvh, b.bvh, T), fcl.CollisionRequest(), fcl.CollisionResult()))
 
 
 def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Array, Array]:
     """Distance (mm) of the true surfaces at least, of the meshes, and its points (3,); no surfaces may meet."""
     import fcl
 
-    place, here = fcl.Transform(T[:3, :3], T[:3, 3]), fcl.Transform()
     lower, best, points = np.inf, np.inf, (np.zeros(3), np.zeros(3))
     for first, e in a.groups:
         for second, f in b.groups:
-            objects = fcl.CollisionObject(first, here), fcl.CollisionObject(second, place)
             answer = fcl.DistanceResult()
-            d = float(fcl.distance(*objects, fcl.DistanceRequest(enable_nearest_points=True), answer))
+            request = fcl.DistanceRequest(enable_nearest_points=True)
+            d = float(fcl.distance(*fcl_pair(first, second, T), request, answer))
             lower = min(lower, d - e - f)
             if d < best:
                 p, q = answer.nearest_points
@@ -178,18 +141,11 @@ def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Arra
 
 def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it."""
-    points = inner.vertices @ T[:3, :3].T + T[:3, 3]
+    points = to_target(T, inner.vertices)
     if (points < outer.box[0] - slack).any() or (points > outer.box[1] + slack).any():
         return False
     if not outer.contains(points[outer.distance(points) > slack]).all():
         return False
-    rest = inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold
-    if rest.is_empty():
-        return True
-    mesh = rest.to_mesh64()
-    corners = np.array(mesh.vert_properties, dtype=np.float64)[:, :3]
-    if outer.distance(corners).max() > slack:
-        return False
+    corners, faces = arrays_of(inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold)
     # What fills a hole of the other may have all its corners on the hole's rim: the middle of its triangles has not.
-    middles = corners[np.array(mesh.tri_verts, dtype=np.int64)].mean(axis=1)
-    return bool((outer.distance(middles) <= slack).all())
+    return bool((outer.distance(np.vstack([corners, corners[faces].mean(axis=1)])) <= slack).all())

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.engine.surface import Surface
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.shells import volume
 from clamp3d.geometry.triangles import closest_points
 
@@ -82,11 +83,14 @@ class Common:
 def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
     intersection = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
-    if intersection.is_empty():
-        return None
-    mesh = intersection.to_mesh64()
-    V, F = np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
-    return Common(V, F) if len(F) else None
+    vertices, faces = arrays_of(intersection)
+    return Common(vertices, faces) if len(faces) else None
+
+
+def arrays_of(manifold: Any) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (m, 3) of a mesh of manifold3d."""
+    mesh = manifold.to_mesh64()
+    return np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
 
 
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:
@@ -97,9 +101,7 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     Negative: nothing is certain.
     """
     points = np.vstack([shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)], shared.inner_points()])
-    back = inverse(T)
-    local = points @ back[:3, :3].T + back[:3, 3]
-    depth = np.maximum(a.distance(points), b.distance(local)) - a.error - b.error
+    depth = np.maximum(a.distance(points), b.distance(to_source(T, points))) - a.error - b.error
     k = int(np.argmax(depth))
     return float(depth[k]), points[k]
 
@@ -121,8 +123,7 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     return bound
 
 
-@dataclass(eq=False)
-class Pieces:
+class Pieces(NamedTuple):
     """Triangles (m, 3, 3): how far from either surface their middles (m,) are, and any point of them (m, 2) at most."""
 
     triangles: Array
@@ -130,40 +131,31 @@ class Pieces:
     at_most: Array
 
     @classmethod
-    def of(cls, a: Surface, b: Surface, triangles: Array, back: Array) -> Pieces:
-        """Measured from two surfaces; ``back`` (4, 4) takes them to the frame of ``b``."""
-        (near_a, most_a), (near_b, most_b) = _distances(a, triangles), _distances(b, _placed(back, triangles))
+    def of(cls, a: Surface, b: Surface, triangles: Array, T: Array) -> Pieces:
+        """Measured from two surfaces, ``b`` at ``T`` (4, 4) in the frame of ``a`` and the triangles."""
+        (near_a, most_a), (near_b, most_b) = _distances(a, triangles), _distances(b, to_source(T, triangles))
         return cls(triangles, np.maximum(near_a, near_b), np.stack([most_a, most_b], axis=1))
 
     def replaced(self, rows: NDArray[np.bool_], by: Pieces) -> Pieces:
         """With others in place of some."""
-        return Pieces(
-            np.concatenate([self.triangles[~rows], by.triangles]),
-            np.concatenate([self.middles[~rows], by.middles]),
-            np.concatenate([self.at_most[~rows], by.at_most]),
-        )
+        return Pieces(*(np.concatenate([own[~rows], new]) for own, new in zip(self, by, strict=True)))
 
 
 def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int) -> Iterator[Pieces]:
     """Triangles (m, 3, 3), and what is left when the furthest are cut, again and again, until ``most`` are added."""
-    back = inverse(T)
-    pieces = Pieces.of(a, b, triangles, back)
-    yield pieces
-    while pieces.at_most.max(initial=0.0) > 0.0:
-        # What is no further than a middle that was measured cannot be the furthest.
-        furthest = pieces.at_most.max(axis=1) > max(
-            0.5 * pieces.at_most.max(), (1.0 + _NO_FURTHER) * pieces.middles.max()
-        )
-        if not furthest.any():
-            return
-        most -= 2 * int(furthest.sum())  # three or four in place of one
-        if most < 0:
-            return
-        from_a = furthest & (pieces.at_most[:, 0] >= pieces.at_most[:, 1])
-        from_b = furthest & ~from_a
-        cut = [_cut(a, np.eye(4), pieces.triangles[from_a]), _cut(b, back, pieces.triangles[from_b])]
-        pieces = pieces.replaced(furthest, Pieces.of(a, b, np.concatenate(cut), back))
+    pieces = Pieces.of(a, b, triangles, T)
+    while True:
         yield pieces
+        # What is no further than a middle that was measured cannot be the furthest.
+        bound = max(0.5 * pieces.at_most.max(initial=0.0), (1.0 + _NO_FURTHER) * pieces.middles.max(initial=0.0))
+        furthest = pieces.at_most.max(axis=1) > bound
+        most -= 2 * int(furthest.sum())  # three or four in place of one
+        if most < 0 or not furthest.any():
+            return
+        from_a = pieces.at_most[:, 0] >= pieces.at_most[:, 1]
+        cut = [_cut(a, np.eye(4), pieces.triangles[furthest & from_a])]
+        cut.append(_cut(b, inverse(T), pieces.triangles[furthest & ~from_a]))
+        pieces = pieces.replaced(furthest, Pieces.of(a, b, np.concatenate(cut), T))
 
 
 def _distances(surface: Surface, triangles: Array) -> tuple[Array, Array]:
@@ -175,17 +167,13 @@ def _distances(surface: Surface, triangles: Array) -> tuple[Array, Array]:
     return distance, np.asarray(largest)
 
 
-def _placed(T: Array, points: Array) -> Array:
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
-
-
 def _cut(surface: Surface, T: Array, pieces: Array) -> Array:
     """Triangles (k, 3, 3) cut where they reach over a border of the surface's triangle nearest to their middle.
 
     Each is cut along one border, upright; those that reach over none are cut in four. ``T`` (4, 4) takes them to the
     surface's frame.
     """
-    local = _placed(T, pieces)
+    local = to_target(T, pieces)
     _, face, _ = surface.nearest(local.mean(axis=1))
     corners = surface.vertices[surface.faces[face]]
     inward = np.cross(surface.normals[face][:, None], np.roll(corners, -1, axis=1) - corners)

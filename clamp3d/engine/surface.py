@@ -86,12 +86,8 @@ class Surface:
 
     @cached_property
     def shell_points(self) -> Array:
-        """Six vertices (k, 6, 3) of each connected surface: those furthest out along the axes."""
-        extremes = []
-        for rows in shells(self.faces, len(self.vertices)):
-            own = self.vertices[np.unique(self.faces[rows])]
-            extremes.append(own[np.concatenate([own.argmin(axis=0), own.argmax(axis=0)])])
-        return np.array(extremes)
+        """A vertex (k, 3) of each connected surface."""
+        return self.vertices[[self.faces[rows[0], 0] for rows in shells(self.faces, len(self.vertices))]]
 
     @cached_property
     def normals(self) -> Array:
@@ -139,7 +135,10 @@ class Surface:
         near = np.ascontiguousarray(points[rows], dtype=np.float64)
         behind, is_certain = self._behind_nearest(near)
         if not is_certain.all():
-            behind[~is_certain] = self._winds_round(near[~is_certain])
+            import igl
+
+            turns = igl.winding_number(self.vertices, self.faces, near[~is_certain])
+            behind[~is_certain] = np.abs(turns) > 0.5
         inside[rows] = behind
         return np.asarray(inside)
 
@@ -158,28 +157,6 @@ class Surface:
     @cached_property
     def _is_closed(self) -> bool:
         return is_closed(self.faces)
-
-    def _winds_round(self, points: Array) -> NDArray[np.bool_]:
-        import igl
-
-        turns = np.empty(len(points))
-        exactly = self.distance(points) <= _SINGLE * self.scale
-        if np.count_nonzero(~exactly) <= _FEW:
-            exactly[:] = True
-        for rows, winding in ((exactly, igl.winding_number), (~exactly, igl.fast_winding_number)):
-            if rows.any():
-                turns[rows] = winding(self.vertices, self.faces, np.ascontiguousarray(points[rows]))
-        return np.asarray(np.abs(turns) > 0.5)
-
-    def certain_depth(self, points: Array) -> Array:
-        """How deep points (k, 3) lie inside the true body at least; negative where that is not certain.
-
-        The distance from the mesh less the error of its triangles; minus infinity for points outside of the mesh.
-        """
-        inside = self.contains(points)
-        depth = np.full(len(points), -np.inf)
-        depth[inside] = self.distance(points[inside]) - self.error
-        return depth
 
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""
@@ -201,10 +178,6 @@ class Surface:
 
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
-_SINGLE = 1e-4
-"""Distance from the surface, relative to its size, up to which the fast winding number, in single floats, may err."""
-_FEW = 8
-"""Points up to which the exact sum over all triangles is quicker than the tree of the fast winding number."""
 
 
 def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
@@ -216,6 +189,13 @@ def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
     tree.addSubModel(vertices, faces)
     tree.endModel()
     return tree
+
+
+def fcl_pair(a: Any, b: Any, T: Array) -> tuple[Any, Any]:
+    """FCL's objects of two trees, the second placed by ``T`` (4, 4)."""
+    import fcl
+
+    return fcl.CollisionObject(a, fcl.Transform()), fcl.CollisionObject(b, fcl.Transform(T[:3, :3], T[:3, 3]))
 
 
 def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDArray[np.int64] | None = None) -> Array:
