@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_target
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,30 +94,18 @@ class Distance:
                 unique = False if np.abs(rest.point_a - best.point_a).max() > 1e-6 else best.unique
         return replace(best, lower=min(self.lower, other.lower), unique=unique)
 
-    def ordered(self) -> Distance:
-        """Bounds that rounding has crossed put in order again."""
-        return self if self.lower <= self.upper else replace(self, lower=self.upper, upper=self.lower)
-
     def widened(self, error: float) -> Distance:
         """The interval enlarged by ``error`` mm on both sides."""
-        if error == 0.0:
-            return self
-        inside = self.interference and (max(0.0, self.interference[0] - error), self.interference[1] + error)
-        return replace(self, lower=self.lower - error, upper=self.upper + error, interference=inside)
+        return self if error == 0.0 else replace(self, lower=self.lower - error, upper=self.upper + error)
 
     def of_overlap(self) -> Distance:
         """What the engine says of an overlap, whose ``lower`` is not one of the depth, without it."""
         return replace(self, lower=-math.inf) if self.lower < 0.0 else self
 
-    def labelled(self, level: str, method: str) -> Distance:
-        """The same, said to come from ``method`` at ``level``."""
-        return replace(self, level=level, method=method)
-
     def moved(self, T: Array) -> Distance:
         """The same with points and normal taken along by ``T`` (4, 4)."""
-        R, t = T[:3, :3], T[:3, 3]
-        p, q = (None if x is None else R @ x + t for x in (self.point_a, self.point_b))
-        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else R @ self.normal)
+        p, q = (None if x is None else to_target(T, x) for x in (self.point_a, self.point_b))
+        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else T[:3, :3] @ self.normal)
 
     def swapped(self) -> Distance:
         """The distance of b and a in place of a and b."""
@@ -186,17 +174,6 @@ class Distances:
     def __repr__(self) -> str:
         least = f", least {self.upper.min():.9g} mm" if len(self) else ""
         return f"Distances({len(self)} poses{least})"
-
-    def with_rows(self, rows: list[int], distances: list[Distance]) -> Distances:
-        """The same with single distances in place of ``rows``."""
-        names, method = ("lower", "upper", "point_a", "point_b", "normal"), list(self.method)
-        fields = {name: getattr(self, name).copy() for name in names}
-        for k, d in zip(rows, distances, strict=True):
-            method[k] = d.method
-            for name, values in fields.items():
-                value = getattr(d, name)
-                values[k] = np.nan if value is None else value
-        return Distances(**fields, method=tuple(method))
 
 
 def _finite(x: float) -> float | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,15 +32,6 @@ class Boxes:
         centre = np.einsum("nij,nj->ni", R, middle) + T[:, :3, 3]
         return cls(centre, 0.5 * (bounds[:, 1] - bounds[:, 0]), R)
 
-    def joined(self, other: Boxes) -> Boxes:
-        """These, then those of ``other``."""
-        return Boxes(*(np.concatenate(both) for both in zip(self.arrays, other.arrays, strict=True)))
-
-    @property
-    def arrays(self) -> tuple[Array, Array, Array]:
-        """Centres, half sizes and rotations."""
-        return self.centre, self.half, self.R
-
     @property
     def reach(self) -> Array:
         """Half sizes (n, 3) of the boxes along the world's axes around them."""
@@ -51,7 +41,7 @@ class Boxes:
 def near_pairs(boxes: Boxes, reach: float) -> NDArray[np.int64]:
     """Pairs (m, 2), first < second, whose boxes along the world's axes come within ``reach`` mm; sorted."""
     pairs = near_between(boxes, boxes, reach)
-    return np.asarray(pairs[pairs[:, 0] < pairs[:, 1]])
+    return pairs[pairs[:, 0] < pairs[:, 1]]
 
 
 def near_between(boxes: Boxes, others: Boxes, reach: float) -> NDArray[np.int64]:
@@ -59,30 +49,14 @@ def near_between(boxes: Boxes, others: Boxes, reach: float) -> NDArray[np.int64]
     grown = 0.5 * reach * (1.0 + 1e-9)
     low, high = boxes.centre - (boxes.reach + grown), boxes.centre + (boxes.reach + grown)
     lows, highs = others.centre - (others.reach + grown), others.centre + (others.reach + grown)
-    first, second = BoxTree(lows, highs).meeting(low, high)
-    return np.column_stack([first, second])[np.lexsort((second, first))]
+    if min(len(low), len(lows)) <= FEW or len(low) * len(lows) <= _AT_ONCE:
+        return np.argwhere(((low[:, None] <= highs) & (lows <= high[:, None])).all(axis=2))
+    from rtree import index
 
-
-class BoxTree:
-    """Boxes along the world's axes, from ``low`` to ``high`` (n, 3), of which those are asked that meet others."""
-
-    def __init__(self, low: Array, high: Array) -> None:
-        self.low, self.high = low, high
-
-    def meeting(self, low: Array, high: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Which boxes of ``low``, ``high`` (m, 3) meet which of these, as pairs in two arrays (k,)."""
-        if min(len(low), len(self.low)) <= FEW or len(low) * len(self.low) <= _AT_ONCE:
-            first, second = np.nonzero(((low[:, None] <= self.high) & (self.low <= high[:, None])).all(axis=2))
-            return first, second
-        found, count = self._tree.intersection_v(low, high)
-        return np.repeat(np.arange(len(low)), count.astype(np.int64)), np.asarray(found, dtype=np.int64)
-
-    @cached_property
-    def _tree(self) -> Any:
-        from rtree import index
-
-        rows = np.arange(len(self.low))
-        return index.Index((rows, self.low, self.high), properties=index.Property(dimension=3))
+    tree: Any = index.Index((np.arange(len(lows)), lows, highs), properties=index.Property(dimension=3))
+    second, count = tree.intersection_v(low, high)
+    first = np.repeat(np.arange(len(low)), count.astype(np.int64))
+    return np.column_stack([first, second]).astype(np.int64)[np.lexsort((second, first))]
 
 
 def box_gaps(boxes: Boxes, pairs: NDArray[np.int64]) -> Array:

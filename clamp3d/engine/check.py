@@ -7,7 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from clamp3d.engine.where import Locator
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, inverse
 
+OnRow = Callable[[PairResult], None]
+
 _SAME = 9
 """Digits (of mm, or of a rotation) to which relative poses agree that one measurement serves."""
 
@@ -39,7 +41,7 @@ def check(
     distances: bool = False,
     depths: bool = True,
     progress: Progress | None = None,
-    on_row: Callable[[PairResult], None] | None = None,
+    on_row: OnRow | None = None,
     cache: ModelCache | None = None,
 ) -> CheckResult:
     """Verdicts of all pairs of a scene, at rest and in its motions.
@@ -91,23 +93,24 @@ def check(
     function("on_row", on_row)
     cache = cache or ModelCache()
     log = _Log(cache.counters)
-    placed = scene.placed
-    of_shape = [cache.model(shape) for shape in placed.shapes]
-    models = [of_shape[k] for k in placed.which.tolist()]
-    boxes = Boxes.of(np.array([m.bounds for m in of_shape]).reshape(-1, 2, 3)[placed.which], placed.poses)
+    of_shape = {id(shape): cache.model(shape) for shape in {id(p.shape): p.shape for p in scene.parts}.values()}
+    models = [of_shape[id(part.shape)] for part in scene.parts]
+    poses = np.array([part.T_world for part in scene.parts]).reshape(-1, 4, 4)
+    boxes = Boxes.of(np.array([model.bounds for model in models]).reshape(-1, 2, 3), poses)
     named = None if pairs is None else _numbered(scene, pairs)
     every = math.comb(len(models), 2) if named is None else len(named)
     near = _candidates(boxes, scene.thresholds.reach, named, everything=distances)
     cache.counters.queries["boxes"] += len(near)
-    questions = _Questions(scene, models, distances=distances, depths=depths)
     log.end("broad phase")
+    progress, on_row = progress or _ignore, on_row or _ignore
+    questions = _Questions(scene, models, distances, depths)
     rows = questions.rows(near.tolist(), box_gaps(boxes, near).tolist(), progress, on_row)
     log.end("pairs")
     moved = check_motions(scene, models, named, progress)
     if scene.motions:
         log.end("motions")
     names = None if named is None else tuple((scene.parts[i].name, scene.parts[j].name) for i, j in named)
-    work = log.work(rows, parts=len(models), shapes=len(of_shape), pairs=every, candidates=len(near))
+    work = log.work(rows, parts=len(models), shapes=len(set(models)), pairs=every, candidates=len(near))
     return CheckResult(scene, tuple(rows), moved, names, work)
 
 
@@ -129,18 +132,14 @@ class _Log:
         """All of it, with how many pairs each level decided."""
         decided = Counter(row.distance.level for row in rows if row.verdict not in (Verdict.FAILED, Verdict.UNCERTAIN))
         decided["broad phase"] = pairs - candidates
-        built, queries = self._counters.built - self._built, self._counters.queries - self._queries
+        built, queries = self._counters.built - self._built, dict(self._counters.queries - self._queries)
         counts = {name: built[name] for name in ("meshes", "triangles", "hulls", "fits")}
-        return Work(
-            parts,
-            shapes,
-            pairs,
-            candidates,
-            **counts,
-            queries=dict(queries),
-            decided=dict(+decided),
-            seconds=self._seconds,
-        )
+        totals = {"parts": parts, "shapes": shapes, "pairs": pairs, "candidates": candidates}
+        return Work(**totals, **counts, queries=queries, decided=dict(+decided), seconds=self._seconds)
+
+
+def _ignore(*_: object) -> None:
+    """What is told to nobody."""
 
 
 def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
@@ -169,40 +168,32 @@ def _candidates(
     return np.array([pair for pair in near.tolist() if tuple(pair) in keep], dtype=np.int64).reshape(-1, 2)
 
 
+@dataclass(frozen=True)
 class _Questions:
     """What is asked of each pair of a scene; one answer serves pairs of equal shapes in equal relative poses."""
 
-    def __init__(self, scene: Scene, models: list[Model], *, distances: bool, depths: bool) -> None:
-        self.scene, self.models = scene, models
-        self.distances, self.depths = distances, depths
-        self._answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = {}
-        self._depths: dict[tuple[object, ...], Distance] = {}
+    scene: Scene
+    models: list[Model]
+    distances: bool
+    depths: bool
+    _answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = field(default_factory=dict)
 
-    def rows(
-        self,
-        near: list[list[int]],
-        gaps: list[float],
-        progress: Progress | None,
-        on_row: Callable[[PairResult], None] | None,
-    ) -> list[PairResult]:
+    def rows(self, near: list[list[int]], gaps: list[float], progress: Progress, on_row: OnRow) -> list[PairResult]:
         """The rows of pairs ``near`` of parts, whose boxes keep ``gaps`` mm: all verdicts first, then the depths."""
         rows: list[PairResult] = []
         for k, ((i, j), gap) in enumerate(zip(near, gaps, strict=True)):
-            if progress is not None:
-                progress("pairs", k, len(near))
-            rows.append(self.row(i, j, gap))
-            if on_row is not None:
-                on_row(rows[k])
+            progress("pairs", k, len(near))
+            rows.append(self._row(i, j, gap))
+            on_row(rows[k])
         overlaps = [k for k, row in enumerate(rows) if row.verdict in BAD] if self.depths else []
         for n, k in enumerate(sorted(overlaps, key=lambda k: rows[k].distance.upper)):
-            if progress is not None:
-                progress("depths", n, len(overlaps))
-            rows[k] = self.row(near[k][0], near[k][1], gaps[k], depth=True)
-            if on_row is not None:
-                on_row(rows[k])
+            progress("depths", n, len(overlaps))
+            i, j = near[k]
+            rows[k] = self._row(i, j, gaps[k], depth=True)
+            on_row(rows[k])
         return rows
 
-    def row(self, i: int, j: int, gap: float, *, depth: bool = False) -> PairResult:
+    def _row(self, i: int, j: int, gap: float, *, depth: bool = False) -> PairResult:
         """The row of parts ``i`` and ``j``, whose boxes keep ``gap`` mm."""
         first, second = self.scene.parts[i], self.scene.parts[j]
         a, b = self.models[i], self.models[j]
@@ -212,16 +203,16 @@ class _Questions:
         start = Distance(gap, level="boxes", method="bounding boxes")
         try:
             if key not in self._answers:
-                self._answers[key] = self._measured(a, b, T, start, allowance)
-            if depth and key not in self._depths:
-                self._depths[key] = penetration(a, b, T, self._answers[key][1], fine=self.distances)
+                self._answers[key] = self._answer(a, b, T, start, allowance)
+            verdict, distance = self._answers[key]
+            if depth and (*key, depth) not in self._answers:
+                self._answers[*key, depth] = verdict, penetration(a, b, T, distance, fine=self.distances)
         except MissingLibraryError:
             raise
         except Exception as error:  # one pair that fails is a finding, not the end of all others
             return PairResult(first.name, second.name, Verdict.FAILED, start, reason=failure(error))
-        verdict, distance = self._answers[key]
         if verdict in BAD:
-            distance = self._depths[key] if depth else distance.of_overlap()
+            distance = self._answers[*key, depth][1] if depth else distance.of_overlap()
         row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
         if verdict in BAD:
             return replace(row, locator=Locator(a, b, first.T_world, T))
@@ -230,7 +221,7 @@ class _Questions:
             return replace(row, reason=undecided(models, distance, self.scene.thresholds, allowance))
         return row
 
-    def _measured(
+    def _answer(
         self, a: Model, b: Model, T: Array, start: Distance, allowance: float | None
     ) -> tuple[Verdict, Distance]:
         """Verdict and distance of ``b`` at ``T`` (4, 4) in a's frame."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, near_between
-from clamp3d.engine.model import Model, Progress
-from clamp3d.engine.moving_pair import MovingPair, box_corners
+from clamp3d.engine.model import Model, Progress, box_corners
+from clamp3d.engine.moving_pair import MovingPair
 from clamp3d.engine.reasons import failure, undecided
 from clamp3d.engine.refine import with_normal
 from clamp3d.engine.result import BAD, PairResult
@@ -18,14 +18,14 @@ from clamp3d.engine.verdict import RESOLUTION, Verdict
 from clamp3d.engine.where import Locator
 from clamp3d.errors import MissingLibraryError
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_target
 
 _STATIONS = 33
 """Times at which the box around a way is put together; what lies between is added as the way's speed allows."""
 
 
 def check_motions(
-    scene: Scene, models: list[Model], named: list[tuple[int, int]] | None, progress: Progress | None = None
+    scene: Scene, models: list[Model], named: list[tuple[int, int]] | None, progress: Progress
 ) -> tuple[PairResult, ...]:
     """Least distance of each moving part from each other part that it comes near, motion by motion.
 
@@ -44,8 +44,7 @@ def check_motions(
             if keep is None or (min(i, j), max(i, j)) in keep
         ]
         for k, (i, j) in enumerate(near):
-            if progress is not None:
-                progress(f"motion {motion.name}", k, len(near))
+            progress(f"motion {motion.name}", k, len(near))
             rows.append(_row(scene, models, poses, resolved, i, j))
         for i in moving:
             poses[i] = resolved.at(1.0, poses[i])
@@ -88,8 +87,8 @@ def _near(
     times = np.linspace(0.0, 1.0, _STATIONS)
     corners = np.empty((len(moving), 2, 3))
     for k, i in enumerate(moving):
-        points = box_corners(models[i], poses[i])
-        way = np.concatenate([points @ T[:3, :3].T + T[:3, 3] for T in (motion.at(t) for t in times)])
+        points = to_target(poses[i], box_corners(models[i].bounds))
+        way = np.concatenate([to_target(T, points) for T in (motion.at(t) for t in times)])
         slack = 0.5 * motion.speed(points) / (len(times) - 1)
         corners[k] = way.min(axis=0) - slack, way.max(axis=0) + slack
     ways = Boxes.of(corners, np.broadcast_to(np.eye(4), (len(moving), 4, 4)))

@@ -22,6 +22,8 @@ from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.kernel.distance import SignedDistance, signed_distance
 
+_ROUNDING = 1e-13
+"""Relative to a bore's radius and place: points this deep in it still count as on its surface."""
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -66,21 +68,18 @@ class ClosedForm:
         depth = np.min([piece.depth(points) for piece in self.outers], axis=0)
         for bore in self.bores:
             local = to_source(bore.T, points)
-            depth = np.minimum(depth, np.hypot(local[:, 0], local[:, 1]) - bore.radius)
+            away = np.hypot(local[:, 0], local[:, 1]) - bore.radius
+            # A bore that just opens a face leaves its rim far from there: a point in it by more than rounding is none.
+            lost = away < -_ROUNDING * (bore.radius + np.abs(bore.T[:3, 3]).max())
+            depth = np.where(lost, -np.inf, np.minimum(depth, away))
         return np.asarray(depth)
 
     @cached_property
     def bounds(self) -> Array:
         """Box (2, 3) along the frame's axes that holds the body."""
-        low, high = np.full(3, -np.inf), np.full(3, np.inf)
-        for piece in self.outers:
-            if isinstance(piece, Rod):
-                axis = piece.T[:3, 2]
-                half = 0.5 * piece.length * np.abs(axis) + piece.radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
-                ends = piece.T[:3, 3] - half, piece.T[:3, 3] + half
-            else:
-                ends = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
-            low, high = np.maximum(low, ends[0]), np.minimum(high, ends[1])
+        axes = np.eye(3)
+        high = np.min([np.diag(piece.support(axes)) for piece in self.outers], axis=0)
+        low = np.max([np.diag(piece.support(-axes)) for piece in self.outers], axis=0)
         return np.array([low, high])
 
 

@@ -46,28 +46,21 @@ class Rod:
         local[:, 2] = np.copysign(0.5 * self.length, m[:, 2])
         return np.asarray(to_target(self.T, local))
 
-    def face(self, n: Array) -> Array:
+    def face(self, n: Array, within: float = FLAT) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): a line on the side, the rim of an end, a point."""
         m = n @ self.T[:3, :3]
         across = float(np.hypot(m[0], m[1]))
-        if across < FLAT:
+        if across < within:
             turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
             rim = self.radius * np.column_stack([np.cos(turn), np.sin(turn)])
             flat = np.vstack([rim, 0.5 * rim, np.zeros((1, 2))])
             local = np.column_stack([flat, np.full(len(flat), np.copysign(0.5 * self.length, m[2]))])
-        elif abs(m[2]) < FLAT:
+        elif abs(m[2]) < within:
             z = np.linspace(-0.5, 0.5, 65) * self.length
             local = np.column_stack([np.outer(np.ones(65), self.radius / across * m[:2]), z])
         else:
             return self.support(n[None])
         return np.asarray(to_target(self.T, local))
-
-    def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
-        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        m = n @ self.T[:3, :3]
-        if float(np.hypot(m[0], m[1])) < within:
-            return 2, None
-        return (1, self.T[:3, 2]) if abs(m[2]) < within else (0, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""
@@ -139,57 +132,45 @@ def _libccd() -> Any:
 def _apart(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array) -> Distance:
     """Bounds of the distance of two pieces from their nearest points as FCL names them."""
     size = norm(q - p)
-    low, normal = _slab(a, Ta, b, Tb, (q - p)[None] / size)
+    near = (q - p)[None] / size
+    low, normal = _slab(a, Ta, b, Tb, near)
+    if size - low > 1e-5:  # the direction of a short distance is mostly rounding
+        low, normal = _slab(a, Ta, b, Tb, np.vstack([near, face_normals(a, Ta, b, Tb)]))
     outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
-    distance = Distance(low, size + 2.0 * outside, p, q, normal, None, "features", "convex")
-    # The direction of a short distance is mostly rounding.
-    return distance if size - low < 1e-5 else distance.meet(_slab_of_faces(a, Ta, b, Tb))
+    return Distance(low, size + 2.0 * outside, p, q, normal, None, "features", "convex")
 
 
 def _overlapping(a: Convex, Ta: Array, b: Convex, Tb: Array, pair: tuple[Any, Any]) -> Distance:
-    """Bounds of the depth of two pieces from FCL's contact; of the distance where they touch within rounding."""
+    """Bounds of the depth of two pieces from FCL's contacts; of the distance where they touch within rounding."""
     import fcl
 
-    contacts = fcl.CollisionResult()
-    fcl.collide(*pair, fcl.CollisionRequest(enable_contact=True, gjk_solver_type=_libccd()), contacts)
-    distance = Distance()
-    for contact in contacts.contacts:
-        n, place = np.asarray(contact.normal, dtype=np.float64), np.asarray(contact.pos) / _ENLARGED
-        if not 0.0 < norm(n) < np.inf:
-            continue
-        n = n / norm(n)
-        low, normal = _slab(a, Ta, b, Tb, np.array([n, -n]))
-        half = 0.5 * abs(float(contact.penetration_depth)) / _ENLARGED
-        distance = replace(_deepest(a, Ta, b, Tb, place + np.outer((0.0, -half, half), n), low), normal=normal)
-    shallow = distance.upper > -_TOUCHING or distance.lower > -_TOUCHING
-    return distance.meet(_slab_of_faces(a, Ta, b, Tb)) if shallow else distance
-
-
-def _deepest(a: Convex, Ta: Array, b: Convex, Tb: Array, trials: Array, low: float) -> Distance:
-    """Distance in an overlap: the deepest of ``trials`` (k, 3) that lie in both pieces, beside a proven ``low``."""
+    answer = fcl.CollisionResult()
+    fcl.collide(*pair, fcl.CollisionRequest(enable_contact=True, gjk_solver_type=_libccd()), answer)
+    contacts = [contact for contact in answer.contacts if 0.0 < norm(contact.normal) < np.inf]
+    normals = np.array([contact.normal for contact in contacts]).reshape(-1, 3)
+    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    low, normal = _slab(a, Ta, b, Tb, np.vstack([normals, -normals, face_normals(a, Ta, b, Tb)]))
+    half = np.array([0.5 * abs(contact.penetration_depth) / _ENLARGED for contact in contacts]).reshape(-1, 1)
+    places = np.array([contact.pos for contact in contacts]).reshape(-1, 3) / _ENLARGED
+    trials = np.vstack([places, places - half * normals, places + half * normals])
     in_a, in_b = a.depth(to_source(Ta, trials)), b.depth(to_source(Tb, trials))
-    inside = np.minimum(in_a, in_b) >= -MEMBER * (1.0 + float(np.abs(trials).max()))
-    depth = np.where(inside, np.maximum(in_a, in_b), -np.inf)
-    k = int(np.argmax(depth))
-    if depth[k] == -np.inf:
-        return Distance(low, method="convex")
-    outside = max(0.0, -float(min(in_a[k], in_b[k])))
-    upper = 4.0 * outside - max(0.0, float(depth[k]))
-    return Distance(low, max(low, upper), trials[k], trials[k], None, None, "features", "convex")
+    inside = np.minimum(in_a, in_b) >= -MEMBER * (1.0 + np.abs(trials).max(initial=0.0))
+    if not inside.any():
+        return Distance(low, normal=normal, method="convex")
+    k = int(np.argmax(np.where(inside, np.maximum(in_a, in_b), -np.inf)))
+    upper = 4.0 * max(0.0, -float(min(in_a[k], in_b[k]))) - max(0.0, float(max(in_a[k], in_b[k])))
+    return Distance(low, max(low, upper), trials[k], trials[k], normal, None, "features", "convex")
 
 
-def _slab_of_faces(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
-    """Lower bound from all faces of both pieces, and what of the other piece looks at each."""
-    trials = []
-    for piece, T, sign in ((a, Ta, 1.0), (b, Tb, -1.0)):
-        trials.append((sign * piece.flat_normals) @ T[:3, :3].T)
-    low, normal = _slab(a, Ta, b, Tb, np.vstack(trials))
-    return Distance(low, normal=normal, method="convex")
+def face_normals(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Array:
+    """Unit normals (k, 3) of all faces of two pieces, from a to b."""
+    return np.vstack([a.flat_normals @ Ta[:3, :3].T, -b.flat_normals @ Tb[:3, :3].T])
 
 
 def _slab(a: Convex, Ta: Array, b: Convex, Tb: Array, near: Array) -> tuple[float, Array]:
-    """Largest signed gap between two planes that part the pieces, square to one of the normals ``near`` (k, 3) from a
-    to b or to what either piece has beside one; and that normal (3,).
+    """Largest signed gap between two planes that part the pieces, and their normal (3,) from a to b.
+
+    Tried are the normals ``near`` (k, 3), and what either piece has beside one of them.
     """
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
     offset = Tb[:3, 3] - Ta[:3, 3]
@@ -231,15 +212,27 @@ def _unique(a: Convex, Ta: Array, b: Convex, Tb: Array, distance: Distance) -> b
     n = distance.normal
     if n is None or distance.lower < -1e-9:
         return None
-    flat, nearly = (_several(a, Ta, b, Tb, n, within) for within in (FLAT, _LEVEL))
-    return not flat if flat == nearly else None
+    if not _several(a, Ta, b, Tb, n, _LEVEL):
+        return True
+    return False if _several(a, Ta, b, Tb, n, FLAT) else None
 
 
 def _several(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, within: float) -> bool:
     """Whether faces, or parallel lines, look at each other along ``n`` (3,); angles below ``within`` count as none."""
-    (i, u), (j, v) = a.flatness(n @ Ta[:3, :3], within), b.flatness(-n @ Tb[:3, :3], within)
-    if i == 0 or j == 0:
+    i, u = _extent(a.face(n @ Ta[:3, :3], within))
+    j, v = _extent(b.face(-n @ Tb[:3, :3], within)) if i else (0, u)
+    if j == 0:
         return False
-    if u is not None and v is not None:
-        return bool(norm(cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within)
-    return True
+    return i + j > 2 or norm(cross(Ta[:3, :3] @ u, Tb[:3, :3] @ v)) <= within
+
+
+def _extent(points: Array) -> tuple[int, Array]:
+    """Dimension of a point, a line or a face given by points (k, 3), and the direction (3,) to the furthest of them."""
+    away = points - points[0]
+    if len(points) == 1:
+        return 0, away[0]
+    along = away[np.argmax((away**2).sum(axis=1))]
+    size = norm(along)
+    along = along / size
+    aside = away - np.outer(away @ along, along)
+    return 1 + bool((aside**2).sum(axis=1).max() > (_LEVEL * size) ** 2), along

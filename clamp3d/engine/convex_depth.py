@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.convex import Convex
+from clamp3d.engine.convex import Convex, face_normals
 from clamp3d.engine.hull import hull
 from clamp3d.geometry.pose import Array, to_target
 
@@ -54,11 +54,13 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     def difference(N: Array) -> Array:
         return sa(N) - sb(-N)
 
-    N = np.vstack([a.flat_normals @ Ta[:3, :3].T, -b.flat_normals @ Tb[:3, :3].T, _SPHERE])
+    N = np.vstack([face_normals(a, Ta, b, Tb), _SPHERE])
     P = difference(N)
     scale = float(np.abs(P).max() + np.abs(Ta[:3, 3]).max() + np.abs(Tb[:3, 3]).max())
     lower, upper, n = expand(difference, N, P, _WIDTH * scale)
-    return _signed(lower, upper, n, sa, sb, 16.0 * _EPS * scale)
+    rounding = 16.0 * _EPS * scale
+    p, q = sa(n[None])[0], sb(-n[None])[0]
+    return Distance(-upper - rounding, -lower + rounding, p, q, n, None, "depth", "convex")
 
 
 def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[float, float, Array]:
@@ -94,8 +96,3 @@ def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[
             break
         P = np.vstack([inner.vertices, new[fresh]])
     return lower, upper, n
-
-
-def _signed(lower: float, upper: float, n: Array, sa: Supports, sb: Supports, rounding: float) -> Distance:
-    p, q = sa(n[None])[0], sb(-n[None])[0]
-    return Distance(-upper - rounding, -lower + rounding, p, q, n, None, "depth", "convex")

@@ -21,8 +21,10 @@ from clamp3d.geometry.pose import Array
 
 _DIRECTIONS = 4
 """Flat sides of the overlap along which the bodies are moved apart."""
-_SHARES = 0.25, 0.5, 0.75, 1.0, 2.0, 4.0
-"""Lengths of a translation that are tried, in extents of the overlap: the way back into a hole is longer than one."""
+_SHARES = np.array([0.25, 0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 4.0])
+"""Lengths of a translation that are tried, in extents of the overlap: the way back into a hole is about one, and of all
+lengths only those that take a pin to within its play of the hole's axis are free.
+"""
 _HALVINGS = 5
 """Halvings of the step to the first length that parts the bodies: then it is known to 1 % of the extent."""
 _EXACT = 1e-9
@@ -103,24 +105,24 @@ def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> 
         if best <= _CLOSE * depth + slack:
             break
         reach = float(np.ptp(shared.vertices @ direction)) + slack
-        low = min(depth, reach)
-        length = _shortest(a, b, T, direction, low + np.array([0.0, *_SHARES]) * (reach - low), best)
+        lengths = reach * _SHARES
+        lengths = np.array([min(depth, reach), *lengths[(lengths > depth) & (lengths < best)]])
+        length = _shortest(a, b, T, direction, lengths)
         if length < best:
             best, way = length, direction
     return best, way
 
 
-def _shortest(a: Surface, b: Surface, T: Array, direction: Array, lengths: Array, most: float) -> float:
-    """A length (mm) below ``most`` after which ``b`` is apart, between two of ``lengths`` (k,), or infinite."""
+def _shortest(a: Surface, b: Surface, T: Array, direction: Array, lengths: Array) -> float:
+    """A length (mm) after which ``b`` is apart, after the first of ``lengths`` (k,), or infinite if none of them is."""
 
     def is_out(length: float) -> bool:
         moved = T.copy()
         moved[:3, 3] += length * direction
         return are_apart(a, b, moved)
 
-    lengths = lengths[(lengths < most) | (lengths == lengths[0])]
-    k = next((k for k, length in enumerate(lengths) if k and is_out(length)), None)
-    if k is None:
+    k = next((k for k in range(1, len(lengths)) if is_out(lengths[k])), 0)
+    if k == 0:
         return np.inf
     low, high = lengths[k - 1 : k + 1].tolist()
     for _ in range(_HALVINGS):

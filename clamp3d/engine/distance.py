@@ -115,7 +115,15 @@ def distances(
     batch = bounds_at_poses(x, y, T)
     is_exact = (batch.lower >= 0.0) & (batch.upper - batch.lower <= ACCURACY)
     rows = np.flatnonzero(~is_exact if model is None else np.ones(len(T), dtype=bool)).tolist()
-    return batch.with_rows(rows, [_measured(x, y, T[k], ACCURACY, model) for k in rows])
+    fields = {name: getattr(batch, name).copy() for name in ("lower", "upper", "point_a", "point_b", "normal")}
+    methods = list(batch.method)
+    for k in rows:
+        answer = _measured(x, y, T[k], ACCURACY, model)
+        methods[k] = answer.method
+        for name, values in fields.items():
+            value = getattr(answer, name)
+            values[k] = np.nan if value is None else value
+    return Distances(**fields, method=tuple(methods))
 
 
 def _bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:

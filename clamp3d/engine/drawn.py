@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from clamp3d.engine.closed_form import Bore, ClosedForm
 from clamp3d.engine.convex import Convex, Rod
 from clamp3d.engine.hull import STRAIGHT, Hull, hull, prism
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.pose import Array, cross, to_target
+from clamp3d.geometry.pose import Array, cross, to_source, to_target, translation
 from clamp3d.geometry.profile import Arc, Profile
 from clamp3d.geometry.shapes import Solid
 
@@ -96,11 +97,11 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
     circle = _circle(hole.profile)
     if circle is not None:
         T = _pose(hole, circle.centre)
-        z, middle = T[:3, 2], T[:3, 3]
-        ends = [(piece.support(np.array([-z, z])) - middle) @ z for piece in body.outers]
-        low, high = float(max(below for below, _ in ends)), float(min(above for _, above in ends))
-        T[:3, 3] = middle + 0.5 * (low + high) * z
-        return [replace(body, bores=(*body.bores, Bore(circle.radius, math.pi, max(high - low, 1e-6), T)))]
+        axis = np.outer((-1.0, 1.0), T[:3, 2])
+        ends = np.array([to_source(T, piece.support(axis))[:, 2] for piece in body.outers])
+        low, high = float(ends[:, 0].max()), float(ends[:, 1].min())
+        bore = Bore(circle.radius, math.pi, max(high - low, 1e-6), T @ translation(0.0, 0.0, 0.5 * (low + high)))
+        return [replace(body, bores=(*body.bores, bore))]
     if hole.profile.arcs:
         return None
     corners = np.array([edge.start for edge in hole.profile.edges])
@@ -115,24 +116,15 @@ def _less(body: ClosedForm, hole: Extrusion) -> list[ClosedForm] | None:
 
 def _beyond(body: ClosedForm, plane: Array) -> ClosedForm | None:
     """What of a body lies in the half-space plane[:3] . x + plane[3] >= 0; None for nothing."""
-    outers: list[Convex] = []
-    for piece in body.outers:
-        if isinstance(piece, Hull):
-            clipped = piece.clipped(plane)
-            if clipped is None:
-                return None
-            outers.append(clipped)
-        else:
-            outers.append(piece)
-    rods = [piece for piece in outers if isinstance(piece, Rod)]
-    if len(rods) == len(outers):
-        rod = rods[0]
-        sides = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-        box = hull(to_target(rod.T, sides * (rod.radius, rod.radius, 0.5 * rod.length)))
-        enclosing = box.clipped(plane)
-        if enclosing is None:
-            return None
-        outers.append(enclosing)
+    rods = [piece for piece in body.outers if isinstance(piece, Rod)]
+    hulls = [piece for piece in body.outers if isinstance(piece, Hull)]
+    if not hulls:
+        sides = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+        hulls = [hull(to_target(rods[0].T, sides * (rods[0].radius, rods[0].radius, 0.5 * rods[0].length)))]
+    clipped = [piece.clipped(plane) for piece in hulls]
+    if None in clipped:
+        return None
+    outers: list[Convex] = [*rods, *(piece for piece in clipped if piece is not None)]
     for rod in rods:
         offset = -float(plane[:3] @ rod.T[:3, 3] + plane[3])
         if abs(float(plane[:3] @ rod.T[:3, 2])) < STRAIGHT and abs(offset) < rod.radius:

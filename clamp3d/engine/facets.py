@@ -5,6 +5,7 @@ The axis enters FCL as a triangle of no width, whose distance from other triangl
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache, reduce
 
 import numpy as np
@@ -24,7 +25,8 @@ _SQUARE = 1e-7
 
 def rods_distance(mesh: Surface, bodies: tuple[ClosedForm, ...], T: Array) -> Distance:
     """Distance of bodies that a cylinder holds each, at ``T`` (4, 4) in the mesh's frame."""
-    return reduce(Distance.union, (_rod_distance(mesh, body, T) for body in bodies))
+    distance = reduce(Distance.union, (_rod_distance(mesh, body, T) for body in bodies))
+    return replace(distance, method="cylinder on facets (FCL)")
 
 
 def rod_of(body: ClosedForm) -> Rod | None:

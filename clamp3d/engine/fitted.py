@@ -14,7 +14,7 @@ from clamp3d.engine.hull import hull
 from clamp3d.engine.surface import Surface
 from clamp3d.fit.features import FittedSurface
 from clamp3d.fit.fit import FitResult
-from clamp3d.geometry.pose import Array, to_source, to_target
+from clamp3d.geometry.pose import Array, to_source, to_target, translation
 
 Faces = NDArray[np.int64]
 
@@ -137,8 +137,7 @@ def _bore(
     Its own triangles, and those of other ``hollow`` surfaces on the same cylinder, may lie in the circle by their
     sagitta, their neighbours as deep as the edges that they share with them, and flat ends as deep as both.
     """
-    T = feature.T_part_feature.copy()
-    local = to_source(T, V)
+    local = to_source(feature.T_part_feature, V)
     own = np.zeros(len(F), dtype=bool)
     for other in hollow:
         own[other.faces] |= other is feature or _on_cylinder(local[np.unique(F[other.faces])], feature.radius, error)
@@ -147,25 +146,21 @@ def _bore(
         return None
     limit = np.full(F.shape, feature.radius - error)
     after = np.roll(F, -1, axis=1)
-    sides, number = np.unique(np.minimum(F, after) * len(V) + np.maximum(F, after), return_inverse=True)
-    number = number.reshape(F.shape)
-    shared = np.zeros(len(sides), dtype=bool)
-    shared[number[own]] = True
-    limit = np.where(shared[number], np.minimum(limit, edges), limit)
-    limit = limit.min(axis=1)
+    sides = np.minimum(F, after) * len(V) + np.maximum(F, after)
+    limit = np.where(np.isin(sides, sides[own]), np.minimum(limit, edges), limit).min(axis=1)
     # Faces square to the axis fill what is between chords and arc; a shoulder among them ends in others that do not.
     square = np.ptp(local[:, 2][F], axis=1) <= 1e-9 * feature.radius
     limit[square] = np.minimum(limit[square], feature.radius - sagitta)
     if (least < limit - 1e-9 * feature.radius)[~own].any():
         return None
     low, high, top = float(local[:, 2].min()), float(local[:, 2].max()), float(local[:, 1].max())
-    T[:3, 3] += 0.5 * (low + high) * T[:3, 2]
     half = math.pi
     if feature.half_angle < math.pi:
         if top > feature.radius * (1.0 - 1e-9):
             return None  # the part rises above the groove's circle: the mesh says more than a groove without walls
         # The mouth's plane goes through the part's highest point: all of it lies behind.
         half = max(feature.half_angle, math.acos(max(-1.0, -top / feature.radius)))
+    T = feature.T_part_feature @ translation(0.0, 0.0, 0.5 * (low + high))
     return Bore(feature.radius, half, high - low, T)
 
 
@@ -195,8 +190,7 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
     everything = [np.unique(F)]
     if not full:
         return [], everything
-    T = full[0].T_part_feature
-    local = to_source(T, V)
+    local = to_source(full[0].T_part_feature, V)
     z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
     rods: list[Rod] = []
     taken: list[tuple[float, float]] = []
@@ -210,11 +204,8 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
         between[feature.faces] = False
         if not coaxial or (between & ~through).any() or any(low < b and a < high for a, b in taken):
             continue
-        place = feature.T_part_feature.copy()
-        middle = (
-            float(((V[own] - place[:3, 3]) @ place[:3, 2]).min() + ((V[own] - place[:3, 3]) @ place[:3, 2]).max()) / 2
-        )
-        place[:3, 3] += middle * place[:3, 2]
+        heights = to_source(feature.T_part_feature, V[own])[:, 2]
+        place = feature.T_part_feature @ translation(0.0, 0.0, 0.5 * float(heights.min() + heights.max()))
         rods.append(Rod(feature.radius, high - low, place))
         taken.append((low, high))
     rest = []

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.geometry.pose import Array, norm
+from clamp3d.geometry.pose import Array
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
@@ -48,23 +48,12 @@ class Hull:
         """The vertices (k, 3) that lie furthest along ``n`` (k, 3)."""
         return np.asarray(self.vertices[np.argmax(n @ self.vertices.T, axis=1)])
 
-    def _highest(self, n: Array, within: float = FLAT) -> Array:
-        height = self.vertices @ n
-        return np.asarray(self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24])
-
-    def face(self, n: Array) -> Array:
+    def face(self, n: Array, within: float = FLAT) -> Array:
         """Points (k, 3) of what lies furthest along ``n`` (3,): corners, and the middles between each two of them."""
-        corners = self._highest(n)
+        height = self.vertices @ n
+        corners = self.vertices[height >= height.max() - within * (1.0 + float(np.ptp(height)))][:24]
         i, j = np.triu_indices(len(corners))
         return np.asarray(0.5 * (corners[i] + corners[j]))
-
-    def flatness(self, n: Array, within: float = FLAT) -> tuple[int, Array | None]:
-        """Dimension of what lies furthest along ``n`` (3,), and its direction if it is a line."""
-        corners = self._highest(n, within)
-        if len(corners) == 2:
-            along = corners[1] - corners[0]
-            return 1, along / norm(along)
-        return (0, None) if len(corners) == 1 else (2, None)
 
     def depth(self, points: Array) -> Array:
         """How deep points (k, 3) lie inside; negative outside, and then no further out than they are."""

@@ -9,11 +9,11 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import depth_of_pieces
 from clamp3d.engine.mesh_distance import within
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import Model, box_corners
 from clamp3d.engine.refine import Enough, refine
 from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.files import cad_process
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array, inverse, to_target
 
 
 def judge(
@@ -53,10 +53,8 @@ def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
     """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
     if a.shape is not b.shape and a.shape != b.shape:
         return False
-    low, high = a.bounds
-    corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    shift = corners @ T[:3, :3].T + T[:3, 3] - corners
-    return bool(np.linalg.norm(shift, axis=1).max() <= contact)
+    corners = box_corners(a.bounds)
+    return bool(np.linalg.norm(to_target(T, corners) - corners, axis=1).max() <= contact)
 
 
 def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:
@@ -79,7 +77,8 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
         small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
         if large is None:
             return False
-        slack = small.error + large.error + _chord(level, inner, outer)
+        # Meshes around and inside of drawn solids are off by their chords.
+        slack = small.error + large.error + sum(m.chords[level] for m in (inner, outer) if m.bracketed)
         if not within(small, large, T, contact + slack):
             return False
     if slack <= contact or inner.exact is None or outer.exact is None:
@@ -87,11 +86,6 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
     shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
     return shared.volume >= inner.exact.volume - contact * shared.area
-
-
-def _chord(level: int, *models: Model) -> float:
-    """How far (mm) meshes around and inside of drawn solids are from the solids."""
-    return sum(model.chords[level] for model in models if model.bracketed)
 
 
 def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:

@@ -34,6 +34,12 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough) 
     In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other. It
     is bounded from above only where that can be ``enough``.
     """
+    chord_error = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
+    distance = _between_meshes(a, b, T, error, enough)
+    return replace(distance, method=f"meshes (FCL){chord_error}")
+
+
+def _between_meshes(a: Model, b: Model, T: Array, error: float, enough: Enough) -> Distance:
     cuts = _CUTS if a.exact is None or b.exact is None else _FEW_CUTS
     outer = surface_distance(a.outer(error), b.outer(error), T, enough, cuts)
     if not (a.bracketed or b.bracketed):

@@ -5,6 +5,7 @@ There is one class for each kind of shape: drawn solids, solids from CAD, and gi
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -50,6 +51,9 @@ less than the usual threshold of contact, 0.01 mm.
 LAST_CHORDS = (CAD_CHORDS[-1], 0.0006)
 """Chord errors (mm) of meshes, however large, for pairs of which Open CASCADE does not find the common part."""
 
+Forms = tuple[ClosedForm, ...]
+"""Bodies in closed form whose union is a shape."""
+
 
 @dataclass
 class Counters:
@@ -67,16 +71,15 @@ class Model:
     """Whether it is a drawn solid."""
     bracketed = False
     """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
-    closed = True
-    """Whether it is known what is inside: not of a mesh with open or crossed edges."""
-    chords: tuple[float, ...] = ()
-    """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
+    thorough = False
+    """Whether its meshes may be finer than ``chords``, however large they are then."""
     exact: BrepSolid | None = None
     """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
 
     def __init__(self, shape: Shape, counters: Counters) -> None:
         self.shape = shape
         self.counters = counters
+        self._meshes: dict[tuple[float, bool], Surface | None] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return model_of, (self.shape, Counters())
@@ -87,26 +90,45 @@ class Model:
         return self.shape.name
 
     @property
+    def closed(self) -> bool:
+        """Whether it is known what is inside: not of a mesh with open or crossed edges."""
+        return True
+
+    @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
         raise NotImplementedError
 
     @property
-    def bodies(self) -> tuple[ClosedForm, ...] | None:
+    def chords(self) -> tuple[float, ...]:
+        """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
+        raise NotImplementedError
+
+    @cached_property
+    def bodies(self) -> Forms | None:
         """The shape in closed form; None if it has none."""
+        raise NotImplementedError
+
+    def _surface(self, chord: float, inside: bool) -> Surface | None:
+        """A mesh of chord error ``chord`` mm; of a bracketed part one that lies ``inside`` of it, or around it."""
         raise NotImplementedError
 
     def outer(self, chord: float) -> Surface:
         """Mesh of chord error ``chord`` mm that holds a drawn solid; of other shapes one whose errors are known."""
-        raise NotImplementedError
+        mesh = self._mesh(chord if self.thorough else max(chord, self.chords[-1]), inside=False)
+        assert mesh is not None
+        return mesh
 
     def inner(self, chord: float) -> Surface | None:
         """Mesh of chord error ``chord`` mm that a drawn solid holds, or None; of other shapes the same as `outer`."""
-        return self.outer(chord)
+        return self._mesh(chord if self.thorough else max(chord, self.chords[-1]), inside=self.bracketed)
 
-    def refine_to(self, chord: float) -> bool:
-        """Use meshes of chord error ``chord`` mm of a solid from CAD from now on; whether that is new."""
-        return False
+    def _mesh(self, chord: float, *, inside: bool) -> Surface | None:
+        if (chord, inside) not in self._meshes:
+            mesh = self._meshes[chord, inside] = self._surface(chord, inside)
+            self.counters.built["meshes"] += mesh is not None
+            self.counters.built["triangles"] += 0 if mesh is None else len(mesh.faces)
+        return self._meshes[chord, inside]
 
     @property
     def refines(self) -> bool:
@@ -114,7 +136,7 @@ class Model:
         return len(self.chords) > 1
 
     @cached_property
-    def enclosing(self) -> tuple[ClosedForm, ...]:
+    def enclosing(self) -> Forms:
         """The closed form, or the convex hull of a mesh that holds the part: for lower bounds alone."""
         if self.bodies is not None:
             return self.bodies
@@ -122,17 +144,15 @@ class Model:
         return (ClosedForm((self._hull(outer.vertices),), error=outer.error),)
 
     @cached_property
-    def quick_bodies(self) -> tuple[ClosedForm, ...] | None:
+    def quick_bodies(self) -> Forms | None:
         """The closed form where it is quicker to ask than the mesh; else None."""
         if self.bodies is None or all(form.surface is None for form in self.bodies):
             return self.bodies
         return self.bodies if len(self.outer(self.chords[0]).faces) <= _LARGE else None
 
-    def _hull_of_convex(self, mesh: Surface) -> tuple[ClosedForm, ...] | None:
+    def _hull_of_convex(self, mesh: Surface) -> Forms | None:
         """A mesh that is its own hull, but for rounding; None if it is not, or so large that the mesh is quicker."""
-        if len(mesh.faces) > _LARGE:
-            return None
-        off = hull_error(mesh.vertices, mesh.faces)
+        off = hull_error(mesh.vertices, mesh.faces) if len(mesh.faces) <= _LARGE else np.inf
         if off > _CONVEX * mesh.scale:
             return None
         return (ClosedForm((self._hull(mesh.vertices),), error=mesh.error + off),)
@@ -140,11 +160,6 @@ class Model:
     def _hull(self, points: Array) -> Hull:
         self.counters.built["hulls"] += 1
         return hull(points)
-
-    def _counted(self, surface: Surface) -> Surface:
-        self.counters.built["meshes"] += 1
-        self.counters.built["triangles"] += len(surface.faces)
-        return surface
 
 
 class DrawnModel(Model):
@@ -155,40 +170,26 @@ class DrawnModel(Model):
 
     def __init__(self, shape: Solid, counters: Counters) -> None:
         super().__init__(shape, counters)
-        round_ = any(outline.profile.arcs for outline in (*shape.bodies, *shape.holes))
-        self.chords = DRAWN_CHORDS if round_ else DRAWN_CHORDS[:1]  # without arcs one mesh is exact
-        self.bracketed = round_
-        self._outer: dict[float, Surface] = {}
-        self._inner: dict[float, Surface | None] = {}
+        self.bracketed = any(outline.profile.arcs for outline in (*shape.bodies, *shape.holes))  # else a mesh is exact
 
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of the part's box, mm."""
         return self.shape.bounds
 
+    @property
+    def chords(self) -> tuple[float, ...]:
+        """Chord errors (mm) of its meshes; one where a mesh is exact."""
+        return DRAWN_CHORDS if self.bracketed else DRAWN_CHORDS[:1]
+
     @cached_property
-    def bodies(self) -> tuple[ClosedForm, ...] | None:
+    def bodies(self) -> Forms | None:
         """Convex pieces less grooves and holes; None for outlines that have no such form."""
         return bodies_of(self.shape)
 
-    def outer(self, chord: float) -> Surface:
-        """Mesh of chord error ``chord`` mm that holds the part."""
-        chord = max(chord, self.chords[-1])
-        if chord not in self._outer:
-            mesh = enclosing(self.shape, chord)
-            assert mesh is not None
-            self._outer[chord] = self._counted(Surface(*mesh))
-        return self._outer[chord]
-
-    def inner(self, chord: float) -> Surface | None:
-        """Mesh of chord error ``chord`` mm that the part holds; None if none is made."""
-        if not self.bracketed:
-            return self.outer(chord)
-        chord = max(chord, self.chords[-1])
-        if chord not in self._inner:
-            mesh = enclosed(self.shape, chord)
-            self._inner[chord] = None if mesh is None else self._counted(Surface(*mesh))
-        return self._inner[chord]
+    def _surface(self, chord: float, inside: bool) -> Surface | None:
+        mesh = enclosed(self.shape, chord) if inside else enclosing(self.shape, chord)
+        return None if mesh is None else Surface(*mesh)
 
 
 class CadModel(Model):
@@ -199,7 +200,6 @@ class CadModel(Model):
     def __init__(self, shape: BrepSolid, counters: Counters) -> None:
         super().__init__(shape, counters)
         self.exact = shape
-        self._meshes: dict[float, Surface] = {}
 
     @property
     def bounds(self) -> Array:
@@ -207,7 +207,7 @@ class CadModel(Model):
         return self.shape.bounds
 
     @cached_property
-    def chords(self) -> tuple[float, ...]:  # type: ignore[override]
+    def chords(self) -> tuple[float, ...]:
         """The chord errors (mm) of its meshes; none if Open CASCADE's triangles do not close: then it is asked."""
         try:
             faces = self.shape.tessellated(CAD_CHORDS[0]).faces
@@ -217,19 +217,13 @@ class CadModel(Model):
             return ()
         return CAD_CHORDS if len(faces) <= _MOST_COARSE else CAD_CHORDS[:1]
 
-    def refine_to(self, chord: float) -> bool:
-        """Use meshes of chord error ``chord`` mm from now on; whether that is new."""
-        if not self.chords or self.chords[-1] <= chord:
-            return False
-        self.chords = (*self.chords, chord)
-        return True
-
     @cached_property
-    def bodies(self) -> tuple[ClosedForm, ...] | None:
+    def bodies(self) -> Forms | None:
         """Bodies around the solid with the cylinders and holes that its faces name; None without any."""
         if not self.chords:
             return None
-        mesh = self._mesh(CHORD)
+        mesh = self._mesh(CHORD, inside=False)
+        assert mesh is not None
         if not (self.shape.surfaces.kind == CYLINDER).any():
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
@@ -242,28 +236,25 @@ class CadModel(Model):
         flat = self.shape.surfaces.kind[tessellation.face] == PLANE
         return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
 
-    def outer(self, chord: float) -> Surface:
-        """Mesh of chord error ``chord`` mm, each triangle with its own error."""
-        return self._mesh(max(chord, self.chords[-1]))
-
-    def _mesh(self, chord: float) -> Surface:
-        if chord not in self._meshes:
-            mesh = self.shape.tessellated(chord)
-            error = at_edges(mesh.vertices, mesh.faces, mesh.errors)
-            self._meshes[chord] = self._counted(Surface(mesh.vertices, mesh.faces, error))
-        return self._meshes[chord]
+    def _surface(self, chord: float, inside: bool) -> Surface:
+        mesh = self.shape.tessellated(chord)
+        return Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors))
 
 
 class MeshModel(Model):
     """Given triangles, with the round surfaces that a fit finds in them."""
 
     shape: MeshShape
-    chords = DRAWN_CHORDS[:1]
 
     @property
-    def closed(self) -> bool:  # type: ignore[override]
+    def closed(self) -> bool:
         """Whether it is known what is inside: not of a mesh with open or crossed edges."""
         return self.shape.mesh.watertight
+
+    @property
+    def chords(self) -> tuple[float, ...]:
+        """One, for the given triangles."""
+        return DRAWN_CHORDS[:1]
 
     @cached_property
     def bounds(self) -> Array:
@@ -273,15 +264,16 @@ class MeshModel(Model):
         return np.array([V.min(axis=0) - reach, V.max(axis=0) + reach])
 
     @cached_property
-    def bodies(self) -> tuple[ClosedForm, ...] | None:
+    def bodies(self) -> Forms | None:
         """Bodies around the mesh with the cylinders, grooves and holes of the fit, or its hull if it is convex."""
         if not self.closed:
             return None
-        if self._fit is not None and self._fit.features:
-            from clamp3d.engine.fitted import bodies_of_fit
+        mesh = self.outer(DRAWN_CHORDS[0])
+        if self._fit is None or not self._fit.features:
+            return self._hull_of_convex(mesh)
+        from clamp3d.engine.fitted import bodies_of_fit
 
-            return bodies_of_fit(self._fit, self.facets, stated=self.shape.error)
-        return self._hull_of_convex(self.facets)
+        return bodies_of_fit(self._fit, mesh, stated=self.shape.error)
 
     @cached_property
     def _fit(self) -> FitResult | None:
@@ -293,23 +285,15 @@ class MeshModel(Model):
         self.counters.built["fits"] += 1
         return fit_mesh(self.shape.mesh)
 
-    @cached_property
-    def facets(self) -> Surface:
+    def _surface(self, chord: float, inside: bool) -> Surface:
         """The triangles; round faces are off by the error of the fit, all by what the shape states."""
         V, F = self.shape.mesh.vertices, self.shape.mesh.faces
-        error = np.full(len(F), self.shape.error) if self.shape.error else None
-        if self._fit is not None and self._fit.features:
-            error = np.zeros(len(F)) if error is None else error
-            patch = np.zeros(len(F), dtype=np.int64)
-            for k, feature in enumerate(self._fit.features):
-                error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
-                patch[feature.faces] = k + 1
-            error = at_edges(V, F, error, patch)
-        return self._counted(Surface(V, F, error))
-
-    def outer(self, chord: float) -> Surface:
-        """The triangles, whatever ``chord``."""
-        return self.facets
+        error = np.full(len(F), self.shape.error)
+        patch = np.zeros(len(F), dtype=np.int64)
+        for k, feature in enumerate(self._fit.features if self._fit is not None else ()):
+            error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
+            patch[feature.faces] = k + 1
+        return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error)
 
 
 def model_of(shape: Shape, counters: Counters) -> Model:
@@ -332,6 +316,11 @@ def _bulge(shape: MeshShape) -> float:
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
     return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))
+
+
+def box_corners(bounds: Array) -> Array:
+    """Corners (8, 3) of a box (2, 3)."""
+    return np.array(list(itertools.product(*bounds.T)))
 
 
 class ModelCache:

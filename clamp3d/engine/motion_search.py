@@ -9,7 +9,6 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable
-from enum import Enum
 from typing import NamedTuple
 
 DistanceAt = Callable[[float], tuple[float, float]]
@@ -31,23 +30,6 @@ class Least(NamedTuple):
     t: float
     lower: float
     upper: float
-    evaluations: int
-
-
-class Outcome(Enum):
-    """How a search for the first time ended."""
-
-    CLEAR = "above the level all the way"
-    REACHED = "down to the level, or to within the accuracy of it"
-    UNDECIDED = "the search ended before it was known"
-
-
-class FirstTime(NamedTuple):
-    """The first time of a level: the distance is above it everywhere before ``t``, which is never late."""
-
-    outcome: Outcome
-    t: float
-    evaluations: int
 
 
 class _Stretch(NamedTuple):
@@ -107,10 +89,11 @@ def least(
     """
     start, stop = distance(0.0), distance(1.0)
     t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
-    evaluations = 2
     heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
-    while heap and heap[0].lower < upper - accuracy and evaluations < most:
+    for evaluations in range(2, most):
+        if not heap or heap[0].lower >= upper - accuracy:
+            break
         if evaluations >= SHARPENING * most and is_enough(min(heap[0].lower, lower), upper):
             break
         stretch = heapq.heappop(heap)
@@ -119,12 +102,11 @@ def least(
             lower = min(lower, stretch.lower)
             continue
         here = distance(middle)
-        evaluations += 1
         if here[1] < upper:
             t, upper = middle, here[1]
         for half in _halves(stretch, middle, here[0]):
             heapq.heappush(heap, _bounded(half, speed, bound, upper - accuracy))
-    return Least(t, min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper, evaluations)
+    return Least(t, min([lower, upper, *(stretch.lower for stretch in heap[:1])]), upper)
 
 
 def first_time(
@@ -135,21 +117,21 @@ def first_time(
     bound: BoundBetween | None = None,
     accuracy: float = ACCURACY,
     most: int = MOST,
-) -> FirstTime:
-    """Find the first time between 0 and 1 at which the distance is at most ``level`` mm.
+) -> float | None:
+    """Find the first time between 0 and 1 at which the distance is at most ``level`` mm; None if it never is.
 
     The other parameters are those of `least`. The time is never late: a stretch is left behind only where its lower
-    bound is above the level. It is early where the distance stays within the accuracy of the level, or where the
-    bounds of ``distance`` are on both sides of it.
+    bound is above the level. It is early where the distance stays within the accuracy of the level, where the bounds of
+    ``distance`` are on both sides of it, or where the search ended.
 
     Examples
     --------
-    >>> round(first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25).t, 5)
+    >>> round(first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25), 5)
     0.75
     """
-    at_start, upper = distance(0.0)
+    at_start, _ = distance(0.0)
     if at_start <= level:
-        return FirstTime(Outcome.REACHED if upper <= level else Outcome.UNDECIDED, 0.0, 1)
+        return 0.0
     todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0)[0])]
     evaluations = 2
     while todo:
@@ -157,14 +139,12 @@ def first_time(
         if stretch.lower > level:
             continue
         middle = 0.5 * (stretch.start + stretch.stop)
-        if (stretch.stop - stretch.start) * speed <= accuracy or not stretch.start < middle < stretch.stop:
-            return FirstTime(Outcome.REACHED, stretch.start, evaluations)
-        if evaluations >= most:
-            return FirstTime(Outcome.UNDECIDED, stretch.start, evaluations)
-        here, _ = distance(middle)
+        is_short = (stretch.stop - stretch.start) * speed <= accuracy or not stretch.start < middle < stretch.stop
+        if is_short or evaluations >= most:
+            return stretch.start
         evaluations += 1
-        todo += reversed(_halves(stretch, middle, here))
-    return FirstTime(Outcome.CLEAR, 1.0, evaluations)
+        todo += reversed(_halves(stretch, middle, distance(middle)[0]))
+    return None
 
 
 def _bounded(stretch: _Stretch, speed: float, bound: BoundBetween | None, enough: float) -> _Stretch:

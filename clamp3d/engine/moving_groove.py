@@ -62,16 +62,17 @@ class MovingInGroove(MovingPair):
         """
         middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
         T = self.motion.at(middle, self.start)
-        d, z = T[:3, 2], np.array([0.0, 0.0, 1.0])
+        d = T[:3, 2]
         # Both ends of the axis from where the axis of the turn is at that time.
         ends = T[:3, 3] - self.motion.point - middle * self.motion.travel
         ends = ends + 0.5 * self.cylinder.length * np.array([-d, d])
         velocities = self.motion.travel + np.cross(self._turn, ends)
-        a, b = _components(velocities.mean(axis=0), d)
+        along = np.column_stack([d, (0.0, 0.0, 1.0)])
+        (a, b), *_ = np.linalg.lstsq(along, velocities.mean(axis=0), rcond=1e-6)
         turning = float(np.linalg.norm(np.cross(self._turn, ends), axis=1).max())
         bend = abs(self.motion.angle) * turning * half  # by how much a velocity changes
         tilting = self._rim * norm(np.cross(self._turn, d))
-        rest = half * (float(np.linalg.norm(velocities - a * d - b * z, axis=1).max()) + bend + tilting)
+        rest = half * (float(np.linalg.norm(velocities - along @ (a, b), axis=1).max()) + bend + tilting)
         length, groove_length = self.cylinder.length + 2.0 * abs(a) * half, self.groove.length + 2.0 * abs(b) * half
         if max(length, groove_length) >= LARGEST:
             return -np.inf
@@ -92,12 +93,3 @@ class MovingInGroove(MovingPair):
         while later < 1.0 and 0.0 < gap(later) <= 2.0 * self.accuracy:
             later, step = min(1.0, later + step), 2.0 * step
         return float(brentq(gap, first, later, xtol=1e-16)) if gap(first) > 0.0 > gap(later) else first
-
-
-def _components(velocity: Array, d: Array) -> tuple[float, float]:
-    """The a and b for which ``a d + b z`` is nearest to a velocity (3,)."""
-    along, along_z, cosine = float(velocity @ d), float(velocity[2]), float(d[2])
-    sine2 = 1.0 - cosine * cosine
-    if sine2 < 1e-6:
-        return 0.0, along_z
-    return (along - cosine * along_z) / sine2, (along_z - cosine * along) / sine2

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import Model, box_corners
 from clamp3d.engine.motion_search import first_time, least
 from clamp3d.engine.refine import Enough, from_boxes, refine, with_normal
 from clamp3d.engine.swept import swept_lower
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array, inverse, to_target
 
 ACCURACY = 1e-6
 """A first contact and a least distance are searched to within this (mm), or to what the models give."""
@@ -39,7 +39,7 @@ class MovingPair:
     def __init__(self, moving: Model, still: Model, motion: Motion, start: Array, T_still: Array) -> None:
         self.a, self.b = moving, still
         self.motion, self.start, self.back = motion, start, inverse(T_still)
-        self.speed = motion.speed(box_corners(moving, start))
+        self.speed = motion.speed(to_target(start, box_corners(moving.bounds)))
         self.evaluations = 0
         self._uninformative = 0
 
@@ -124,12 +124,4 @@ class MovingPair:
             here = self.at(t, enough)
             return here.lower, here.upper
 
-        answer = first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, most=MOST)
-        return None if answer.outcome.name == "CLEAR" else answer.t
-
-
-def box_corners(model: Model, T: Array) -> Array:
-    """Corners (8, 3) of the box around a shape, placed by ``T`` (4, 4)."""
-    pick = np.indices((2, 2, 2)).reshape(3, -1).T
-    points = np.where(pick == 0, model.bounds[0], model.bounds[1])
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+        return first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, most=MOST)

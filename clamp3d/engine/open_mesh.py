@@ -6,12 +6,14 @@ of both around the place. So a crossing has a depth that is certain, without an 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.mesh_distance import nearest_points, one_inside, rounding_of, surfaces_meet
 from clamp3d.engine.model import Model
-from clamp3d.engine.surface import Surface
+from clamp3d.engine.surface import Surface, fcl_pair
 from clamp3d.geometry.pose import Array, inverse, to_target
 
 _PAIRS = 4000
@@ -26,6 +28,11 @@ def open_distance(a: Model, b: Model, T: Array) -> Distance:
     Without a crossing the surfaces are as far apart as said. If an open mesh seems to wind round the other part,
     nothing says that they are apart: ``lower`` is minus infinity.
     """
+    names = " and ".join(model.name for model in (a, b) if not model.closed)
+    return replace(_surface_distance(a, b, T), method=f"surfaces (FCL), inside of {names} unknown")
+
+
+def _surface_distance(a: Model, b: Model, T: Array) -> Distance:
     outer_a, outer_b = a.outer(OPEN_ERROR), b.outer(OPEN_ERROR)
     lower = -np.inf if surfaces_meet(outer_a, outer_b, T) else nearest_points(outer_a, outer_b, T)[0]
     inner_a, inner_b = a.inner(OPEN_ERROR), b.inner(OPEN_ERROR)
@@ -49,10 +56,9 @@ def _crossing(a: Surface, b: Surface, T: Array) -> tuple[float, Array | None]:
     """A depth (mm) that the crossing of two surfaces certainly has, and where; 0.0 if they only touch."""
     import fcl
 
-    place = fcl.Transform(T[:3, :3], T[:3, 3])
     answer = fcl.CollisionResult()
     request = fcl.CollisionRequest(num_max_contacts=_PAIRS, enable_contact=True)
-    fcl.collide(fcl.CollisionObject(a.bvh, fcl.Transform()), fcl.CollisionObject(b.bvh, place), request, answer)
+    fcl.collide(*fcl_pair(a.bvh, b.bvh, T), request, answer)
     if not answer.contacts:
         return 0.0, None
     rows = np.array([(contact.b1, contact.b2) for contact in answer.contacts])

@@ -11,21 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, instance, items
-from clamp3d.engine.answer import Distance
 from clamp3d.engine.batch import bounds_at_poses
-from clamp3d.engine.broad import Boxes, box_gaps, near_between
+from clamp3d.engine.broad import Boxes, near_between
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Model, ModelCache
+from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, check_pose_array, inverse
 
-_BLOCK = 8192
-"""Poses that are compared with all others together: what their boxes take is then a few megabytes."""
-
 _NAMES = np.array([verdict.value for verdict in VERDICTS])
-_CLASH, _UNCERTAIN, _CLEAR = map(VERDICTS.index, (Verdict.CLASH, Verdict.UNCERTAIN, Verdict.CLEAR))
+_OPEN = [VERDICTS.index(verdict) for verdict in (Verdict.CLASH, Verdict.UNCERTAIN)]
+"""Verdicts of bounds that are not the last word: a part that clashes may hold the other whole."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,7 +73,7 @@ class PoseVerdicts:
     @property
     def worst(self) -> NDArray[np.str_]:
         """Worst verdict (n,) of each pose."""
-        worst = np.full(self.poses, _CLEAR)
+        worst = np.full(self.poses, VERDICTS.index(Verdict.CLEAR))
         np.minimum.at(worst, self.row, self.rank)
         return np.asarray(_NAMES[worst])
 
@@ -140,7 +138,9 @@ def check_poses(
     moving, standing = cache.model(scene.parts[number].shape), [cache.model(scene.parts[k].shape) for k in rest]
     P = np.array([scene.parts[k].T_world for k in rest]).reshape(-1, 4, 4)
     reach = scene.thresholds.reach + RESOLUTION
-    row, column = _near(T, moving, P, standing, reach)
+    boxes = Boxes.of(np.broadcast_to(moving.bounds, (len(T), 2, 3)), T)
+    still = Boxes.of(np.array([model.bounds for model in standing]).reshape(-1, 2, 3), P)
+    row, column = near_between(boxes, still, reach).T
     least, most, rank = np.empty(len(row)), np.empty(len(row)), np.empty(len(row), dtype=np.int8)
     for k, (name, other) in enumerate(zip(names, standing, strict=True)):
         own = np.flatnonzero(column == k)
@@ -159,43 +159,16 @@ def _judged(
     batch = bounds_at_poses(a, b, T)
     least, most = batch.lower.copy(), batch.upper.copy()
     rank = thresholds.verdicts(least, most, allowance)
-    holds = rank == _CLASH  # a part may hold the other whole
-    left = np.flatnonzero((rank == _UNCERTAIN) | holds)
-    if len(left):
-        poses = np.concatenate([T[left], np.eye(4)[None]])
-        boxes = np.concatenate([np.repeat(b.bounds[None], len(left), axis=0), a.bounds[None]])
-        pairs = np.column_stack([np.full(len(left), len(left)), np.arange(len(left))])
-        gaps = box_gaps(Boxes.of(boxes, poses), pairs)
-        a.counters.queries["boxes"] += len(left)
-    for k, m in enumerate(left.tolist()):
-        if holds[m]:
-            rank[m] = VERDICTS.index(kind_of_overlap(a, b, T[m], thresholds.contact))
-            continue
-        if gaps[k] >= thresholds.reach + RESOLUTION:
-            least[m], rank[m] = gaps[k], _CLEAR
-            continue
+    for k in np.flatnonzero(np.isin(rank, _OPEN)).tolist():
         try:
-            verdict, distance = judge(a, b, T[m], Distance(float(gaps[k])), thresholds, allowance)
-            rank[m], least[m], most[m] = VERDICTS.index(verdict), distance.lower, distance.upper
+            if VERDICTS[rank[k]] is Verdict.CLASH:
+                rank[k] = VERDICTS.index(kind_of_overlap(a, b, T[k], thresholds.contact))
+                continue
+            a.counters.queries["boxes"] += 1
+            verdict, distance = judge(a, b, T[k], from_boxes(a, b, T[k]), thresholds, allowance)
+            rank[k], least[k], most[k] = VERDICTS.index(verdict), distance.lower, distance.upper
         except MissingLibraryError:
             raise
         except Exception:  # one pose that fails is a finding, not the end of all others
-            rank[m], least[m], most[m] = VERDICTS.index(Verdict.FAILED), -np.inf, np.inf
+            rank[k], least[k], most[k] = VERDICTS.index(Verdict.FAILED), -np.inf, np.inf
     return least, most, rank
-
-
-def _near(
-    T: Array, moving: Model, P: Array, standing: list[Model], reach: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Poses and others (m,) whose boxes come within ``reach`` mm of each other, ordered by pose."""
-    if not standing:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    still = Boxes.of(np.array([model.bounds for model in standing]), P)
-    rows, columns = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for start in range(0, len(T), _BLOCK):
-        some = T[start : start + _BLOCK]
-        boxes = Boxes.of(np.broadcast_to(moving.bounds, (len(some), 2, 3)), some)
-        pairs = near_between(boxes, still, reach)
-        rows.append(start + pairs[:, 0])
-        columns.append(pairs[:, 1])
-    return np.concatenate(rows), np.concatenate(columns)

@@ -20,7 +20,7 @@ def undecided(models: dict[str, Model], distance: Distance, thresholds: Threshol
     for name, model in models.items():
         if not model.closed:
             advice.append(f"a closed mesh of {name}")
-        elif isinstance(model, MeshModel) and model.facets.error > 0.0:
-            advice.append(f"a finer mesh of {name} (its round faces are off by up to {model.facets.error:.2g} mm)")
+        elif isinstance(model, MeshModel) and (error := model.outer(0.0).error) > 0.0:
+            advice.append(f"a finer mesh of {name} (its round faces are off by up to {error:.2g} mm)")
     would = f"; what would decide: {' or '.join(advice)}" if advice else ""
     return (f"between the bounds: {marks}" if marks else "the bounds allow several verdicts") + would

@@ -8,16 +8,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, box_gaps
-from clamp3d.engine.closed_form import ClosedForm, bodies_distance
+from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
 from clamp3d.engine.mesh_distance import meshes_distance
-from clamp3d.engine.model import LAST_CHORDS, Model
+from clamp3d.engine.model import LAST_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import SolverError
 from clamp3d.files.pairs import TOLERANCE
@@ -47,74 +46,47 @@ def refine(a: Model, b: Model, T: Array, start: Distance, enough: Enough, *, cad
     distance = start
     if enough(distance):
         return distance
-    for level in _levels(a, b, T, cad_forms):
-        distance = _agreed(distance, level(partial(_enough_with, distance, enough)))
+
+    def is_enough(answer: Distance) -> bool:
+        return enough(distance.meet(answer))
+
+    for level, answer in _levels(a, b, T, is_enough, cad_forms):
+        a.counters.queries[level] += 1
+        distance = _agreed(distance, replace(answer, level=level))
         if enough(distance):
             break
     return distance
 
 
-def _enough_with(distance: Distance, enough: Enough, new: Distance) -> bool:
-    """Whether a new answer is enough together with the one so far."""
-    return enough(distance.meet(new))
-
-
-def _levels(a: Model, b: Model, T: Array, cad_forms: bool) -> Iterator[Callable[[Enough], Distance]]:
-    """The levels that apply to a pair, from cheap to dear."""
-    queries = a.counters.queries
+def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
+    """What the levels that apply to a pair say, from cheap to expensive; each is measured when it is asked for."""
     if not (a.closed and b.closed):
-        queries["open meshes"] += 1
-        yield lambda _: _of_open_meshes(a, b, T)
+        yield "meshes", open_distance(a, b, T)
         return
     both_exact = a.exact is not None and b.exact is not None
-    forms = cad_forms or not both_exact
-    if forms and a.quick_bodies is not None and b.quick_bodies is not None:
-        yield partial(_by_closed_forms, a, b, T, (a.quick_bodies, b.quick_bodies))
-    if forms:
-        yield from _cylinders_on_facets(a, b, T)
+    if cad_forms or not both_exact:
+        if a.quick_bodies is not None and b.quick_bodies is not None:
+            yield "features", _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+        if _is_round(b) and not a.drawn and a.chords:
+            yield "facets", rods_distance(a.outer(a.chords[-1]), b.bodies or (), T)
+        if _is_round(a) and not b.drawn and b.chords:
+            yield "facets", rods_distance(b.outer(b.chords[-1]), a.bodies or (), inverse(T)).moved(T).swapped()
     for chord in _chords(a, b):
-        yield partial(_by_meshes, a, b, T, chord)
+        yield "meshes", meshes_distance(a, b, T, chord, enough)
     if both_exact:
-        from clamp3d.engine.exact import exact_distance
+        from clamp3d.engine.exact import exact_distance, exact_overlap
 
-        queries["exact"] += 1
-        yield lambda _: exact_distance(a, b, T)
+        yield "exact", exact_distance(a, b, T)
         for share in SHARES:
-            yield partial(_by_common_part, a, b, T, share)
-        for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
-            if a.refine_to(chord) | b.refine_to(chord):
-                yield partial(_by_meshes, a, b, T, chord)
-
-
-def _cylinders_on_facets(a: Model, b: Model, T: Array) -> Iterator[Callable[[Enough], Distance]]:
-    """Levels for exact cylinders of one part against the facets of the other, where that is a mesh."""
-    if _is_round(b) and not a.drawn and a.chords:
-        yield lambda _: _on_facets(a, b, T)
-    if _is_round(a) and not b.drawn and b.chords:
-        yield lambda _: _on_facets(b, a, inverse(T)).moved(T).swapped()
+            yield "exact", exact_overlap(a, b, T, share)
+        a.thorough = b.thorough = True  # Open CASCADE did not find the common part
+        for chord in LAST_CHORDS:
+            yield "meshes", meshes_distance(a, b, T, chord, enough)
 
 
 def _is_round(model: Model) -> bool:
     """Whether a cylinder holds each piece of a body."""
     return bool(model.bodies) and all(rod_of(body) is not None for body in model.bodies or ())
-
-
-def _on_facets(mesh: Model, round_: Model, T: Array) -> Distance:
-    mesh.counters.queries["facets"] += 1
-    distance = rods_distance(mesh.outer(mesh.chords[-1]), round_.bodies or (), T)
-    return distance.labelled("facets", "cylinder on facets (FCL)")
-
-
-def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough) -> Distance:
-    a.counters.queries["meshes"] += 1
-    chord_error = f", chord error {chord:.2g} mm" if a.refines or b.refines else ""
-    return meshes_distance(a, b, T, chord, enough).labelled("meshes", f"meshes (FCL){chord_error}")
-
-
-def _by_common_part(a: Model, b: Model, T: Array, share: float, _: Enough) -> Distance:
-    from clamp3d.engine.exact import exact_overlap
-
-    return exact_overlap(a, b, T, share)
 
 
 def _chords(a: Model, b: Model) -> list[float]:
@@ -134,37 +106,25 @@ def _agreed(old: Distance, new: Distance) -> Distance:
             f"{new.level} ({new.method}) and {old.level} ({old.method}) disagree: "
             f"[{new.lower:.9g}, {new.upper:.9g}] and [{old.lower:.9g}, {old.upper:.9g}] mm"
         )
-    return met.ordered()
+    return replace(met, lower=min(met.lower, met.upper), upper=max(met.lower, met.upper))
 
 
-def _of_open_meshes(a: Model, b: Model, T: Array) -> Distance:
-    names = " and ".join(model.name for model in (a, b) if not model.closed)
-    return open_distance(a, b, T).labelled("meshes", f"surfaces (FCL), inside of {names} unknown")
-
-
-def _by_closed_forms(
-    a: Model, b: Model, T: Array, bodies: tuple[tuple[ClosedForm, ...], tuple[ClosedForm, ...]], enough: Enough
-) -> Distance:
+def _by_closed_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:
     """The nearest pair of the bodies of two parts, asked in the order of their boxes' distances."""
-    n, forms = len(bodies[0]), [*bodies[0], *bodies[1]]
-    if len(forms) == 2:
-        a.counters.queries["features"] += 1
-        distance = bodies_distance(forms[0], forms[1], T, enough)
-        return distance.labelled("features", distance.method)
-    boxes = Boxes.of(np.array([form.bounds for form in forms]), np.array([np.eye(4)] * n + [T] * len(bodies[1])))
-    rows = np.array(list(itertools.product(range(n), range(n, len(forms)))))
-    gaps = box_gaps(boxes, rows) - np.array([forms[i].error + forms[j].error for i, j in rows.tolist()])
+    if len(a) == len(b) == 1:
+        return bodies_distance(a[0], b[0], T, enough)
+    boxes = Boxes.of(np.array([form.bounds for form in (*a, *b)]), np.array([np.eye(4)] * len(a) + [T] * len(b)))
+    rows = np.array(list(itertools.product(range(len(a)), range(len(a), len(a) + len(b)))))
+    pairs = list(itertools.product(a, b))
+    gaps = box_gaps(boxes, rows) - np.array([x.error + y.error for x, y in pairs])
     distance = Distance(np.inf, np.inf)
     for k in np.argsort(gaps, kind="stable").tolist():
         if gaps[k] > distance.upper:  # of these and all that follow
             break
-        a.counters.queries["features"] += 1
-        i, j = rows[k].tolist()
-        distance = distance.union(bodies_distance(forms[i], forms[j], T, lambda d: d.upper - d.lower <= 1e-10))
-    if distance.lower < -1e-6:
-        # Where two pieces of a body meet, neither knows how deep a point lies in both together.
-        distance = replace(distance, lower=-np.inf)
-    return distance.labelled("features", distance.method)
+        x, y = pairs[k]
+        distance = distance.union(bodies_distance(x, y, T, lambda d: d.upper - d.lower <= 1e-10))
+    # Where two pieces of a body meet, neither knows how deep a point lies in both together.
+    return replace(distance, lower=-np.inf) if distance.lower < -1e-6 else distance
 
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:

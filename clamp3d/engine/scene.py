@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, items, shown, text
 from clamp3d.engine.allowed import Allowances, Allowed
@@ -51,26 +51,6 @@ class Part:
         return type(self), (self.name, self.shape, self.T_world, self.component)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Placed:
-    """All parts of a scene as arrays: ``names``, ``poses`` (n, 4, 4), different ``shapes``, ``which`` of them (n,)."""
-
-    names: tuple[str, ...]
-    poses: Array
-    shapes: tuple[Shape, ...]
-    which: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, parts: tuple[Part, ...]) -> Placed:
-        """The parts, in their order; equal shapes are one."""
-        place: dict[Shape, int] = {}
-        unique = {id(part.shape): part.shape for part in parts}
-        number = {key: place.setdefault(shape, len(place)) for key, shape in unique.items()}
-        which = np.array([number[id(part.shape)] for part in parts], dtype=np.int64)
-        poses = np.array([part.T_world for part in parts]).reshape(-1, 4, 4)
-        return cls(tuple(part.name for part in parts), poses, tuple(place), which)
-
-
 @dataclass(frozen=True, repr=False)
 class Scene:
     """Parts in the world, what counts as contact and clearance, what may touch, and how parts move.
@@ -106,12 +86,9 @@ class Scene:
             for item in values:
                 instance(f"each of {key}", item, kind)
             object.__setattr__(self, key, values)
-        if len(self._index) < len(self.parts):
-            seen: set[str] = set()
-            for part in self.parts:
-                if part.name in seen:
-                    raise InputError(f"part {part.name!r} is there twice; names must differ")
-                seen.add(part.name)
+        for k, part in enumerate(self.parts):
+            if self._index[part.name] > k:
+                raise InputError(f"part {part.name!r} is there twice; names must differ")
         for item in self.allowed:
             self._check_allowed(item)
         for motion in self.motions:
@@ -125,11 +102,6 @@ class Scene:
     def thresholds(self) -> Thresholds:
         """What counts as contact and clearance."""
         return Thresholds(self.contact, self.clearance)
-
-    @cached_property
-    def placed(self) -> Placed:
-        """Its parts as arrays."""
-        return Placed.of(self.parts)
 
     @cached_property
     def _index(self) -> dict[str, int]:

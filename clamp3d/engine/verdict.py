@@ -109,10 +109,3 @@ class Thresholds:
         depth = self.contact if allowance is None else max(allowance, self.contact)
         marks.append((-depth, f"an overlap of {depth:g} mm ({'contact' if allowance is None else 'allowed'})"))
         return [words for mark, words in marks if distance.lower <= mark <= distance.upper]
-
-    def margin(self, distance: float) -> float:
-        """How far ``distance`` is from the nearest threshold, mm."""
-        marks = [-self.contact, self.contact]
-        if self.clearance > 0.0:
-            marks.append(self.clearance)
-        return min(abs(distance - mark) for mark in marks)

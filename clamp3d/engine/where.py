@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.engine.model import MeshModel, Model
+from clamp3d.engine.model import MeshModel, Model, box_corners
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.errors import Clamp3dError
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_target
 
 _SHARE = 0.005
 """Relative width of the interval of the volume at which it is not refined further."""
@@ -66,21 +66,17 @@ class Locator:
         """Where they overlap; None if not even meshes around them do, or one has no inside that is known."""
         if not (self.a.closed and self.b.closed):
             return None
-        rough = self._by_meshes() if self.a.chords and self.b.chords else None
-        if rough is not None and (rough.volume[1] - rough.volume[0] <= _SHARE * rough.volume[1]):
-            return rough
-        return self._exact(rough) or rough
-
-    def _by_meshes(self) -> Overlap | None:
+        both_exact = self.a.exact is not None and self.b.exact is not None
+        chords = sorted({*self.a.chords, *self.b.chords}, reverse=True) if self.a.chords and self.b.chords else []
         overlap = None
-        for chord in sorted({*self.a.chords, *self.b.chords}, reverse=True):
+        for chord in chords[:1] if both_exact else chords:
             finer = self._at(chord)
             if finer is None:
                 break
             overlap = finer
             if finer.volume[1] - finer.volume[0] <= _SHARE * finer.volume[1]:
-                break
-        return overlap
+                return finer
+        return (self._exact(overlap) if both_exact else None) or overlap
 
     def _at(self, chord: float) -> Overlap | None:
         """From meshes of one chord error (mm)."""
@@ -99,16 +95,15 @@ class Locator:
         low = 0.0 if inner is None else max(0.0, inner.volume - slack)
         point = None
         if inner is not None and inner_a is not None and inner_b is not None:
-            point = self._in_world(deepest(inner_a, inner_b, self.T_ab, inner)[1])
-        corners = self._in_world(outer.vertices)
-        box = np.array([corners.min(axis=0) - off, corners.max(axis=0) + off])
+            point = to_target(self.T_a, deepest(inner_a, inner_b, self.T_ab, inner)[1])
+        box = _box(to_target(self.T_a, outer.vertices), off)
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
         return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
 
     def _exact(self, rough: Overlap | None) -> Overlap | None:
-        """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
-        if self.a.exact is None or self.b.exact is None:
-            return None
+        """From Open CASCADE, for two solids from CAD; None where it fails."""
+        assert self.a.exact is not None
+        assert self.b.exact is not None
         from clamp3d.files.cad_process import common as exact_common
 
         try:
@@ -117,12 +112,11 @@ class Locator:
             return None
         if not shared.volume > 0.0:
             return None
-        corners = self._in_world(
-            np.array([(x, y, z) for x in shared.box[:, 0] for y in shared.box[:, 1] for z in shared.box[:, 2]])
-        )
-        box = np.array([corners.min(axis=0), corners.max(axis=0)])
+        corners = to_target(self.T_a, box_corners(shared.box))
         volume = (shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT))
-        return Overlap(volume, box if rough is None else rough.box, False, None if rough is None else rough.point)
+        return Overlap(volume, _box(corners), False, None if rough is None else rough.point)
 
-    def _in_world(self, points: Array) -> Array:
-        return np.asarray(points @ self.T_a[:3, :3].T + self.T_a[:3, 3])
+
+def _box(points: Array, slack: float = 0.0) -> Array:
+    """Lower and upper corner (2, 3) of a box around points (k, 3), ``slack`` mm larger."""
+    return np.array([points.min(axis=0) - slack, points.max(axis=0) + slack])

@@ -1,4 +1,4 @@
-"""All pairs of an assembled clamp against Open CASCADE, for six pairs of wires: thick, thin, clamped and not."""
+"""All pairs of an assembled clamp against Open CASCADE, for two pairs of wires."""
 
 import itertools
 
@@ -9,18 +9,12 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.engine.check import check
 from clamp3d.engine.distance import distance, measure
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
 from clamp3d.geometry.pose import inverse
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-WIRES = [
-    (None, None),
-    ("LJ-16", "LJ-16"),
-    ("LJ-16", "LJ-800"),
-    ("LJ-800", "LJ-16"),
-]
+WIRES = [(None, None), ("LJ-16", "LJ-800")]
 CACHE = ModelCache()
 SHAPES = {}
 
@@ -99,24 +93,3 @@ def test_the_reference_clamp():
         T = inverse(first.T_world) @ second.T_world
         assert distance(first.shape, second.shape, T).value == found[a, b].value
         assert distance(second.shape, first.shape, inverse(T)).value == pytest.approx(found[a, b].value, abs=1e-9)
-
-
-def test_bounds_hold_at_random_poses():
-    """Apart: Open CASCADE's distance lies between the bounds. Overlapping: the least that can be said is its sign."""
-    rng = np.random.default_rng(0)
-    parts = assemble().scene.parts
-    for _ in range(25):
-        a, b = (parts[k] for k in rng.choice(7, 2, replace=False))
-        T = np.eye(4)
-        T[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        T[:3, 0] *= np.sign(np.linalg.det(T[:3, :3]))
-        T[:3, 3] = rng.normal(size=3) * rng.choice([20.0, 60.0, 120.0])
-        scene = Scene().add("a", a.shape).add("b", b.shape, T)
-        d = check(scene, distances=True, depths=False, cache=CACHE).pairs[0].distance
-        A, B = placed(type(a)("a", a.shape)), placed(type(b)("b", b.shape, T))
-        truth = least(A, B)
-        assert d.lower <= d.upper
-        if d.lower > 0.0:
-            assert d.lower - 1e-6 <= truth <= d.upper + 1e-6, (a.name, b.name, T.tolist(), truth, d)
-        elif d.upper < 0.0:
-            assert common_volume(A, B) > 0.0, (a.name, b.name, T.tolist(), d)

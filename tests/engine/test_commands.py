@@ -123,17 +123,6 @@ def test_a_clash_in_motion_is_told_with_its_depth_and_first_contact(tmp_path):
     assert t == pytest.approx((20.0 - 0.01) / 25.0, abs=2e-4)
 
 
-def test_check_of_a_clamp_measures_all_21_pairs_as_run_does(tmp_path):
-    a, b = tmp_path / "check.json", tmp_path / "run.json"
-    assert clamp3d("check", "reference", "--json", a).returncode == 0
-    assert clamp3d("run", "reference", "--json", b).returncode == 0
-    checked, ran = json.loads(a.read_text())["pairs"], json.loads(b.read_text())["contacts"]
-    assert len(checked) == 21
-    distances = {(c["a"], c["b"]): c["distance_mm"] for c in ran}
-    for pair in checked:
-        assert pair["distance_mm"] == pytest.approx(distances[pair["a"], pair["b"]], abs=1e-9)
-
-
 def test_check_takes_wires_for_a_clamp_only(tmp_path):
     assert clamp3d("check", "reference", "--line", "LJ-500", "-q").returncode == 0
     done = clamp3d("check", EXAMPLES / "hinge" / "scene.toml", "--line", "LJ-500")
@@ -150,24 +139,6 @@ def test_distances_measures_pairs_that_a_verdict_does_not_need(tmp_path):
     every = json.loads(data.read_text())["pairs"]
     assert len(few) < len(every) == 15
     assert all(pair["at_most_mm"] - pair["at_least_mm"] < 0.1 for pair in every)
-
-
-def test_page_on_stdout_is_nothing_but_the_page():
-    done = clamp3d("check", EXAMPLES / "v-block" / "scene.toml", "--html", "-")
-    assert done.returncode == 1
-    assert done.stdout.startswith("<!DOCTYPE html>")
-    assert done.stdout.rstrip().endswith("</html>")
-    assert "block-3 and bar-low clash" in done.stderr
-
-
-@pytest.mark.parametrize("source", [EXAMPLES / "v-block" / "scene.toml", EXAMPLES / "hinge" / "pin.stl"])
-def test_view_takes_what_check_takes(source, tmp_path):
-    page = tmp_path / "page.html"
-    done = clamp3d("view", source, "--html", page)
-    assert done.returncode == (1 if source.suffix == ".toml" else 0), done.stderr
-    said = page_text(page.read_text())
-    assert ("1 clash, deepest" in said) == (source.suffix == ".toml")
-    assert ("Nothing checked: there are no two parts" in said) == (source.suffix == ".stl")
 
 
 def test_check_of_some_pairs_is_clean(tmp_path):
@@ -203,8 +174,6 @@ def test_bad_input_is_one_line_and_exit_2(arguments, message, tmp_path):
 
 
 def test_sweep_writes_map_and_points(tmp_path):
-    from PIL import Image
-
     picture, data = tmp_path / "map.png", tmp_path / "map.json"
     done = clamp3d("sweep", "--wire", "P7", "--steps", "8", "--map", picture, "--json", data)
     assert done.returncode == 0, done.stderr
@@ -215,7 +184,4 @@ def test_sweep_writes_map_and_points(tmp_path):
     assert sum(written["counts"].values()) == 16
     low, high = written["captured_mm"]
     assert f"sideways {low:+.1f} to {high:+.1f} mm" in done.stdout
-    with Image.open(picture) as image:
-        assert image.width > 1000
-        colours = {c for _, c in image.convert("RGB").getcolors(1 << 20)}
-    assert {(0x33, 0x22, 0x88), (0xD5, 0xD8, 0xDC)} <= colours
+    assert picture.read_bytes().startswith(b"\x89PNG")

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from clamp3d.engine.convex import Rod, _deepest, convex_distance
+from clamp3d.engine.convex import Rod, convex_distance
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.distance import distance
 from clamp3d.engine.hull import Hull, hull
@@ -59,13 +59,12 @@ def some_pair(seed):
     return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
 
 
-def test_a_point_beside_a_piece_attests_no_overlap():
-    """Two boxes that touch; the point lies in one of them, and by rounding as far beside the other."""
-    off = 1e-9
-    corners_of = np.array([(x, y, z) for x in (-5.0, 5.0) for y in (-5.0, 5.0) for z in (-5.0, 5.0)])
-    box = hull(corners_of)
-    found = _deepest(box, HERE, box, translation(10.0, 0.0, 0.0), np.array([[5.0 + off, 0.0, 0.0]]), -1.0)
-    assert 0.0 <= found.upper <= 4.0 * off
+@pytest.mark.parametrize("gap", [-1e-9, -1e-12, 0.0, 1e-12, 1e-9])
+def test_a_point_beside_a_piece_attests_no_overlap(gap):
+    """Two boxes that touch within rounding: a point of one counts as one of the other, and is no deeper for it."""
+    box = hull(np.array([(x, y, z) for x in (-5.0, 5.0) for y in (-5.0, 5.0) for z in (-5.0, 5.0)]))
+    found = convex_distance(box, HERE, box, translation(10.0 + gap, 0.0, 0.0))
+    assert found.lower - 1e-13 <= gap <= found.upper + 1e-13
 
 
 @pytest.mark.parametrize("seed", range(24))
@@ -111,29 +110,6 @@ def test_what_is_left_before_a_plane():
         assert (left.vertices @ plane[:3] + plane[3]).min() >= -1e-9
     assert CUBE.clipped(np.array([0.0, 0.0, 1.0, 3.0])) is CUBE
     assert CUBE.clipped(np.array([0.0, 0.0, 1.0, -3.0])) is None
-
-
-def test_points_of_boxes_and_cylinders_attest_their_distance():
-    """Of nearly parallel ones too: the points are in the pieces and no further apart than is said, to rounding."""
-    rng, seen = np.random.default_rng(0), 0
-    for _ in range(120):
-        a, b = (
-            Rod(*rng.uniform(1.0, 9.0, 2), HERE)
-            if rng.random() < 0.55
-            else hull(0.5 * rng.uniform(1.0, 9.0, 3) * CUBE.vertices / np.array([1.0, 2.0, 3.0]))
-            for _ in range(2)
-        )
-        T = rotation(rng.normal(size=3), rng.choice([1e-7, 1e-5, 1e-3, 0.3, 2.0]))
-        T[:3, 3] = rng.normal(size=3) * rng.choice([6.0, 12.0])
-        found = convex_distance(a, HERE, b, T)
-        if found.upper <= 0.0:
-            continue
-        seen += 1
-        p, q = found.point_a, found.point_b
-        assert np.linalg.norm(q - p) <= found.upper + 1e-13
-        assert min(a.depth(p[None])[0], b.depth(to_target(inverse(T), q)[None])[0]) >= -1e-10
-        assert found.upper - found.lower <= 5e-7
-    assert seen > 70
 
 
 @pytest.mark.parametrize("tilt", [0.0, 8e-10, -8e-10])

@@ -12,7 +12,6 @@ from clamp3d.engine.convex import Rod
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.distance import distance
 from clamp3d.engine.hull import hull
-from clamp3d.engine.model import ModelCache
 from clamp3d.engine.scene import Scene
 from clamp3d.geometry import shapes
 from clamp3d.geometry.mesh import make_mesh
@@ -113,35 +112,18 @@ def test_without_depths_an_overlap_is_at_least():
     assert check(scene).pairs[0].distance.depth == pytest.approx(3.0, abs=1e-9)
 
 
-BODIES = {
-    "box": shapes.box((12.0, 9.0, 7.0)),
-    "rod": shapes.cylinder(4.0, 18.0),
-    "tube": shapes.cylinder(8.0, 14.0, bore=5.0),
-    "plate": shapes.box((30.0, 24.0, 6.0), holes=[shapes.Hole(5.0)]),
-    "groove": shapes.groove_block(SweptArc(7.0, 1.0, 30.0), 24.0, 12.0),
-}
-
-
-CACHE = ModelCache()
-
-
-def quick(a, b, T):
-    """The distance without the search for a depth."""
-    scene = Scene(contact=1e-6).add("a", a).add("b", b, T)
-    return check(scene, distances=True, depths=False, cache=CACHE).pairs[0].distance
-
-
 @pytest.mark.parametrize("turn", [0.0, 0.3, -0.7])
 def test_what_touches_within_its_errors_comes_free_along_a_unit_normal(turn):
     """A wire on the floor of a groove that is known as a mesh only: its facets are 0.05 mm off."""
-    made = mesh(BODIES["groove"], 0.05)
+    groove = shapes.groove_block(SweptArc(7.0, 1.0, 30.0), 24.0, 12.0)
+    made = mesh(groove, 0.05)
     block = shapes.MeshShape(make_mesh(made.vertices, made.faces), "off", "block", 0.05)
     wire = shapes.cylinder(3.0, 18.0)
     T = translation(4.0 * math.sin(turn), -4.0 * math.cos(turn), 0.0)
     d = distance(block, wire, T)
     assert d.lower < 0.0 < d.upper
     assert np.linalg.norm(d.normal) == pytest.approx(1.0, abs=1e-12)
-    assert quick(BODIES["groove"], wire, translation(*((1e-6 - d.lower) * d.normal)) @ T).lower > 0.0
+    assert distance(groove, wire, translation(*((1e-6 - d.lower) * d.normal)) @ T).lower > 0.0
 
 
 def _extruded(outline, half):

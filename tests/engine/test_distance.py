@@ -9,7 +9,6 @@ from clamp3d.clamp.parts import parts
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.check import check
 from clamp3d.engine.distance import distance, measure
-from clamp3d.engine.motions import first_contact
 from clamp3d.engine.result import CheckResult, PairResult
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.engine.verdict import Verdict
@@ -113,26 +112,6 @@ def test_a_clash_in_a_motion_is_in_counts_findings_and_data_alike():
     assert [f["motion"] for f in result.to_dict()["findings"]] == ["drop"]
     assert repr(result) == "CheckResult('scene': not clean; 1 clash, 1 clear)"
     assert "<td>drop</td>" in result._repr_html_()
-
-
-def floor_with_bead():
-    floor = shapes.box((400, 40, 10))
-    bead = Extrusion(Profile.circle(5.0, (-53.25, -1.0)), "Y", -20.0, 20.0)
-    return shapes.Solid("floor", (*floor.bodies, bead))
-
-
-def test_sliding_close_above_a_floor_is_no_contact_before_the_bead():
-    # The block's edge is 0.02 mm above the floor and meets the bead, which stands out 1 mm.
-    reach = math.sqrt(25.0 - 4.02**2)
-    hit = first_contact(
-        floor_with_bead(),
-        shapes.box((20, 20, 20)),
-        Motion.translate((250, 0, 0)),
-        translation(-53.25 - reach - 10.0 - 0.115 * 250.0, 0, 15.02),
-    )
-    assert hit.touches
-    assert hit.t <= 0.115 + 1e-12
-    assert hit.t == pytest.approx(0.115, abs=2e-6)
 
 
 OCTAHEDRON = make_mesh(

@@ -38,14 +38,3 @@ def test_example(name):
     for key, value in expected.get("motions", {}).items():
         _expect(moved[key], value)
     measured_alike(scene, result)
-
-
-def test_bar_in_v_block_from_step_and_from_stl():
-    from clamp3d.fit.fit import fit_file
-
-    pytest.importorskip("OCP")
-    stl, step = (
-        fit_file(EXAMPLES / "v-block" / f"bar.{kind}", unit=unit) for kind, unit in (("stl", "mm"), ("step", None))
-    )
-    for result in (stl, step):
-        assert result.cylinders[0].radius == pytest.approx(15.0, abs=2e-5)

@@ -13,7 +13,7 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.check import check
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Thresholds, Verdict
-from clamp3d.errors import InputError, SolverError
+from clamp3d.errors import SolverError
 from clamp3d.geometry import shapes
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import translation
@@ -85,13 +85,6 @@ def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tm
     if broken_pair:
         assert "features and boxes disagree" in page.read_text()
         assert "1 pair failed" in data["headline"]
-
-
-def test_one_part_alone_is_nothing_to_check(tmp_path):
-    file = tmp_path / "scene.toml"
-    file.write_text('[parts.a]\nshape = "box"\nsize = [1, 1, 1]\n')
-    with pytest.raises(InputError, match="no pair of parts"):  # exit code 2
-        CliRunner().invoke(group, ["check", str(file), "-q"], catch_exceptions=False)
 
 
 def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from clamp3d.engine.check import check
-from clamp3d.engine.motions import first_contact, min_clearance
+from clamp3d.engine.motions import first_contact
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
 from clamp3d.errors import InputError
@@ -18,7 +18,7 @@ from clamp3d.geometry import shapes
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
@@ -46,16 +46,6 @@ def test_a_part_that_hardly_turns_arrives_too(angle, far):
     np.testing.assert_allclose(motion.at(1.0, start), goal, rtol=4e-16, atol=1e-11)
     middle = 0.5 * (start[:3, 3] + goal[:3, 3])
     np.testing.assert_allclose(motion.at(0.5, start)[:3, 3], middle, rtol=4e-16, atol=max(1e-11, 50.0 * angle))
-
-
-def test_a_turn_about_an_axis_far_away_costs_a_groove_no_accuracy():
-    groove, wire, start = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0), translation(-1.0, -1.0, 0.0)
-    goals = [rotation((0.1, 0.2, 1.0), angle) for angle in (0.0, 1e-10)]
-    for goal in goals:
-        goal[:3, 3] = 3.0, 0.5, 0.0
-    straight, turned = (min_clearance(groove, wire, Motion.to_pose(goal), start) for goal in goals)
-    assert turned.resolution == pytest.approx(straight.resolution)
-    assert turned.distance.upper == pytest.approx(straight.distance.upper, abs=1e-8)
 
 
 def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():

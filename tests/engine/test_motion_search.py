@@ -1,12 +1,10 @@
 """The search over time, on distances that are formulas of the time."""
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d.engine.motion_search import Outcome, bound_by_speed, first_time, least
+from clamp3d.engine.motion_search import bound_by_speed, first_time, least
 
 times = st.floats(0.0, 1.0)
 
@@ -38,10 +36,8 @@ def test_least_and_first_time_of_the_minimum_of_cones(peaks):
     assert f(answer.t) == answer.upper
     level = value + 0.5
     first = max(0.0, min(p - (level - v) / 3.0 for p, v in peaks if v <= level))
-    result = first_time(exactly(f), 3.0, level, accuracy=1e-6)
-    assert result.outcome is Outcome.REACHED
-    assert first - 1e-6 <= result.t <= first + 1e-12
-    assert first_time(exactly(f), 3.0, value - 1e-3).outcome is Outcome.CLEAR
+    assert first - 1e-6 <= first_time(exactly(f), 3.0, level, accuracy=1e-6) <= first + 1e-12
+    assert first_time(exactly(f), 3.0, value - 1e-3) is None
 
 
 def test_intervals_give_bounds_that_hold_and_first_times_that_are_never_late():
@@ -51,31 +47,48 @@ def test_intervals_give_bounds_that_hold_and_first_times_that_are_never_late():
     answer = least(between, 1.0)
     assert answer.lower == pytest.approx(-0.01, abs=1e-6)
     assert answer.upper == pytest.approx(0.02, abs=1e-6)
-    assert first_time(between, 1.0, 0.1).t == pytest.approx(0.39, abs=2e-6)
-    assert first_time(between, 1.0, 0.495).outcome is Outcome.UNDECIDED  # it is not known of the start
+    assert first_time(between, 1.0, 0.1) == pytest.approx(0.39, abs=2e-6)
+    assert first_time(between, 1.0, 0.495) == 0.0  # it is not known of the start
+
+
+class Counted:
+    """A distance that does not change, and how often it was asked for."""
+
+    def __init__(self, value):
+        self.value, self.times = value, 0
+
+    def __call__(self, t):
+        self.times += 1
+        return self.value, self.value
 
 
 def test_a_constant_distance_needs_a_bound_between_times_or_ends_undecided():
-    assert first_time(exactly(lambda t: 0.01), 100.0, 0.0).outcome is Outcome.CLEAR
-    assert first_time(exactly(lambda t: 1e-5), 100.0, 0.0, most=500).outcome is Outcome.UNDECIDED
-    wide = least(exactly(lambda t: 1e-5), 100.0, most=500)
+    assert first_time(Counted(0.01), 100.0, 0.0) is None
+    near = Counted(1e-5)
+    assert 0.0 < first_time(near, 100.0, 0.0, most=500) < 1e-3
+    assert near.times == 500
+    wide = least(near, 100.0, most=500)
     assert wide.lower < 0.0 < wide.upper
-    assert wide.evaluations == 500
-    known = least(exactly(lambda t: 1e-5), 100.0, bound=lambda start, stop: 1e-5)
-    assert (known.lower, known.upper, known.evaluations) == (1e-5, 1e-5, 2)
-    assert first_time(exactly(lambda t: 1e-5), 100.0, 0.0, bound=lambda start, stop: 1e-5).evaluations == 2
+    assert near.times == 1000
+    bounded = Counted(1e-5)
+    bounds = least(bounded, 100.0, bound=lambda start, stop: 1e-5)
+    assert (bounds.lower, bounds.upper, bounded.times) == (1e-5, 1e-5, 2)
+    assert first_time(bounded, 100.0, 0.0, bound=lambda start, stop: 1e-5) is None
+    assert bounded.times == 4
 
 
 def test_grazing_by_less_than_the_accuracy_is_reached_and_by_more_is_clear():
     def parabola(gap):
         return exactly(lambda t: gap + 4.0 * (t - 0.5) ** 2)
 
-    assert first_time(parabola(1e-8), 4.0, 0.0).outcome is Outcome.REACHED
-    assert first_time(parabola(1e-5), 4.0, 0.0).outcome is Outcome.CLEAR
+    assert first_time(parabola(1e-8), 4.0, 0.0) == pytest.approx(0.5, abs=1e-3)
+    assert first_time(parabola(1e-5), 4.0, 0.0) is None
     assert least(parabola(1e-8), 4.0).t == pytest.approx(0.5, abs=1e-3)
 
 
 def test_what_stands_still_is_searched_at_once():
-    assert least(exactly(lambda t: 1.5), 0.0).evaluations == 2
-    assert first_time(exactly(lambda t: 1.5), 0.0, 1.0).outcome is Outcome.CLEAR
-    assert math.isclose(first_time(exactly(lambda t: 1.5), 0.0, 2.0).t, 0.0)
+    still = Counted(1.5)
+    assert least(still, 0.0).upper == 1.5
+    assert first_time(still, 0.0, 1.0) is None
+    assert first_time(still, 0.0, 2.0) == 0.0
+    assert still.times == 5

@@ -154,16 +154,6 @@ def test_pairs_asked_for_only(run):
         check(clamp_scene(run), pairs=[("P1", "P9")])
 
 
-def test_table_and_frame(run):
-    result = check(clamp_scene(run))
-    table = result.table()
-    assert {row["a"] for row in table} <= set(run.poses)
-    pandas = pytest.importorskip("pandas")
-    frame = result.frame()
-    assert isinstance(frame, pandas.DataFrame)
-    assert (frame.verdict == "contact").sum() == len(TOUCHING)
-
-
 def test_poses_inside_are_contained_as_a_check_says():
     """A short wire in the groove, in the material, half out of it; a small box in a large one, and around it."""
     block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 30.0)
@@ -230,26 +220,6 @@ def test_verdicts_of_many_distances_are_those_of_each(bounds, allowance, clearan
     thresholds = Thresholds(clearance=clearance)
     each = [thresholds.verdict(Distance(*pair), allowance).value for pair in zip(lower, upper, strict=True)]
     assert [VERDICTS[k].value for k in thresholds.verdicts(lower, upper, allowance)] == each
-
-
-def test_equal_parts_of_a_scene_are_each_met_where_they_stand():
-    """A row of equal blocks, one of them turned, one allowed to be touched: as the checks of single poses say."""
-    rng = np.random.default_rng(5)
-    block = shapes.groove_block(SweptArc(7.0, math.radians(60), 50.0), 40.0, 20.0)
-    scene = Scene(clearance=0.5)
-    for k in range(40):
-        place = translation(45.0 * k, 0.0, 0.0) @ (rotation((0, 1, 0), 0.1) if k == 3 else np.eye(4))
-        scene = scene.add(f"block{k}", block, place)
-    scene = scene.add("wire", shapes.cylinder(6.5, 30.0)).allow(("wire", "block2"), overlap=0.3)
-    poses = np.array([rotation(rng.normal(size=3), 0.02) for _ in range(20)])
-    poses[:, :3, 3] = rng.uniform(-0.8, 0.8, (20, 3)) + np.outer(rng.integers(0, 5, 20) * 45.0, [1, 0, 0])
-    sweep = check_poses(scene, "wire", poses)
-    for k, T in enumerate(poses):
-        one = check(scene.moved({"wire": T}))
-        assert [one.verdict("wire", name).value for name in sweep.others] == sweep.verdict[k].tolist()
-        assert sweep.worst[k] == min(sweep.verdict[k], key=[v.value for v in Verdict].index)
-    assert (sweep.lower <= sweep.upper).all()
-    assert set(sweep.verdict.ravel()) >= {"clash", "clear", "clearance", "allowed"}
 
 
 def test_rows_come_as_they_are_decided_and_the_deepest_overlap_first():

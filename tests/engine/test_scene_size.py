@@ -14,7 +14,6 @@ from clamp3d.engine.scene import Scene
 from clamp3d.geometry import shapes
 from clamp3d.geometry.pose import translation
 from clamp3d.output.scene_report import check_to_text
-from clamp3d.output.viewer import view
 
 SIZES = (100, 400)
 BOX = shapes.box((10, 10, 10))
@@ -73,12 +72,3 @@ def test_work_grows_with_the_parts(step):
     run(few)  # what is made once
     grown = calls(lambda: run(many)) / calls(lambda: run(few))
     assert grown <= 1.3 * SIZES[1] / SIZES[0], f"{step}: {grown:.1f} times the work for 4 times the parts"
-
-
-def test_pages_grow_with_the_parts(tmp_path):
-    size = []
-    for n in SIZES:
-        scene = allowed(row_of_boxes(n))
-        view(check(scene), serve=False).save_html(tmp_path / "page.html")
-        size.append((tmp_path / "page.html").stat().st_size)
-    assert size[1] <= 1.3 * size[0] * SIZES[1] / SIZES[0]

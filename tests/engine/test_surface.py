@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,7 +13,6 @@ from shapely import Polygon
 from clamp3d.engine.check import check
 from clamp3d.engine.mesh_distance import meshes_distance
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.overlap import common, cut_up
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.surface import Surface, at_edges
 from clamp3d.engine.verdict import Verdict
@@ -70,15 +68,6 @@ def test_on_the_seam_of_a_union_gaps_and_overlaps_are_those_of_its_face(size, ap
     assert row.distance.lower - 1e-8 <= gap <= row.distance.upper + 1e-8
 
 
-@pytest.mark.parametrize(("radius", "verdict"), [(4.9, "clear"), (4.99, "contact"), (5.0, "contact"), (5.05, "clash")])
-def test_a_round_bar_in_a_round_hole_whose_facets_differ(radius, verdict):
-    """Polygons of 200 and 180 sides in each other: their facets overlap by less than their sagittas, 0.0014 mm."""
-    plate = trimesh.creation.annulus(r_min=5.0, r_max=12.0, height=6.0, sections=180)
-    bar = trimesh.creation.cylinder(radius=radius, height=20.0, sections=200)
-    scene = Scene().add("plate", mesh_shape(plate)).add("bar", mesh_shape(bar), rotation([0, 0, 1], 0.01))
-    assert check(scene, pairs=[("plate", "bar")]).verdict("plate", "bar").value == verdict
-
-
 def test_flat_faces_of_a_part_with_a_hole_stay_exact():
     """The chords of one bolt hole say nothing against the flat faces."""
     plate = trimesh.boolean.difference(
@@ -122,14 +111,3 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.verdict is Verdict.CLASH
     assert -0.100001 <= row.distance.lower <= row.distance.upper <= -0.07
     assert row.distance.upper - row.distance.lower <= 0.01
-
-
-def test_an_overlap_is_cut_up_only_until_its_thickness_is_known():
-    """A slab of constant thickness: no triangle can be shown to be thinner than the middles that were measured."""
-    ring = trimesh.creation.annulus(3.0, 10.0, 3.0, sections=24)
-    a = Surface(ring.vertices, ring.faces)
-    T = translation(0.3, 0.2, 3.0 - 0.02)
-    shared = common(a, a, T)
-    *_, last = cut_up(a, a, T, shared.vertices[shared.faces], 200_000)
-    assert last.at_most.max() == pytest.approx(0.02, rel=2e-3)
-    assert len(last.triangles) < 20_000
