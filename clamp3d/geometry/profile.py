@@ -232,7 +232,10 @@ class Profile:
 
         extent = max(np.ptp(self.bounds, axis=0))
         error = max(_FINE * extent, MIN_MESH_ERROR)
-        ring = Polygon(self.polygon(error))
+        corners = self.polygon(error)
+        if len(corners) < 3:
+            raise InputError(f"outline must be wider than {_CLOSURE:g} mm")
+        ring = Polygon(corners)
         if ring.is_valid:
             return
         off = abs(make_valid(ring).area - (self.area - sum(self.chord_areas(error) * np.array([1.0, -1.0]))))

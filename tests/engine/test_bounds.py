@@ -21,13 +21,13 @@ SLOW = settings(
 SOME = st.sampled_from(DRAWN)
 
 
-@settings(SLOW, max_examples=12)
+@settings(SLOW, max_examples=8)
 @given(SOME, SOME, poses(25.0))
 def test_any_pair_of_drawn_solids(a, b, T):
     assert_distance(distance(a, b, T), a, b, T)
 
 
-@settings(SLOW, max_examples=12)
+@settings(SLOW, max_examples=8)
 @given(
     st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
     st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
@@ -53,7 +53,7 @@ def test_facets_that_are_the_part(key, b, T):
     assert_distance(distance(faceted, b, T, accuracy=1e-3), faceted, b, T, cells=3000)
 
 
-@settings(SLOW, max_examples=12)
+@settings(SLOW, max_examples=8)
 @given(st.sampled_from([key for key in FACETED if key[1] != "off"]), st.sampled_from([DRAWN[3], DRAWN[5]]), poses(20.0))
 def test_a_fitted_mesh_has_the_bounds_of_the_part_it_comes_from(key, b, T):
     """Its corners lie on the part's surface, so what is said of it must hold for the part."""
@@ -78,7 +78,7 @@ def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
     assert outer.contains(x[body(shape).field(x) < 0.0]).all()
 
 
-@settings(SLOW, max_examples=12)
+@settings(SLOW, max_examples=8)
 @given(
     st.sampled_from(["chords", "wedges"]),
     st.sampled_from([2.0, 10.0, 30.0]),

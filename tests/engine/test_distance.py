@@ -133,6 +133,15 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
     assert d.upper >= truth - 1e-9
 
 
+@pytest.mark.parametrize("depth", [5e-7, 1e-8])
+def test_what_lies_over_a_bore_that_just_opens_a_face_is_measured_to_its_rim(depth):
+    """Along the face there is no material for 0.017 mm: a bar that is half as wide is apart by half of that."""
+    cube = shapes.box((1000.0, 1000.0, 1000.0), holes=[shapes.Hole(300.0, (0.0, 200.0 + depth))])
+    half = math.sqrt(300.0**2 - (300.0 - depth) ** 2)
+    found = distance(cube, shapes.box((half, 10.0, 2000.0)), translation(0.0, 505.0, 0.0))
+    assert found.lower <= 0.5 * half <= found.upper + 1e-6
+
+
 def test_witnesses_lie_on_the_bodies_where_meshes_decide():
     """A coin of many corners on edge in a tube: no closed form, so the meshes have the last word."""
     tube, turn = shapes.cylinder(8.0, 10.0, bore=5.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -103,19 +102,6 @@ parts = ["cube", "pla*"]
     assert row.distance.value == pytest.approx(32.9 / 2 - 32.67 / 2, abs=1e-6)
 
 
-def test_wires_of_a_clamp_are_names_or_diameters():
-    by_number = parse_scene("[clamp]\nline = 33.6\njumper = 16\n")
-    by_text = parse_scene('[clamp]\nline = "33.6"\njumper = "16"\n')
-    for one, other in zip(by_number.parts, by_text.parts, strict=True):
-        assert one.shape == other.shape
-        assert (one.T_world == other.T_world).all()
-    part = parse_scene('[parts.p]\nshape = "clamp-part"\npart = "P7"\njumper = 16\n').parts[0]
-    assert part.shape == by_number.parts[6].shape
-    for wrong in ("[3]", "true", "-1", "nan"):
-        with pytest.raises(InputError, match="jumper"):
-            parse_scene(f"[clamp]\njumper = {wrong}\n")
-
-
 def test_whole_clamp_with_its_own_connections():
     scene = parse_scene('[clamp]\nname = "reference"\njumper = "LJ-150"\npose = { rpy_deg = [0, 0, 30] }\n')
     assert [p.name for p in scene.parts] == ["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
@@ -166,7 +152,6 @@ def test_motions():
             "parts.box: 2 holes together leave nothing of the part",
         ),
         (BOX + "pose = { quaternion = [0, 0, 0, 2] }\n", "parts.box.pose.quaternion: must have length 1, got 2"),
-        (BOX + "pose = { quaternion = [0, 0, 1e300, 1e308] }\n", "quaternion: must have length 1, got 1e+308"),
         (BOX + "pose = { translation = [nan, 0, 0] }\n", "parts.box.pose.translation.0: must be a finite number"),
         (BOX + '[[allowed]]\nparts = ["box", "bax"]\n', "allowed: unknown part 'bax'; available: box"),
         (BOX + '[[allowed]]\nparts = ["box", "box"]\n', "allowed must name two parts, got 'box' twice"),
@@ -174,15 +159,10 @@ def test_motions():
             BOX + '[[motions]]\nparts = ["box"]\n',
             "motions.0.translate: give exactly one of translate, rotate, screw, to",
         ),
-        (BOX + '[[motions]]\nparts = ["b"]\ntranslate = [0, 0, 1]\n', "unknown part 'b'; available: box"),
         ("clearence = 1\n" + BOX, "clearence is not a known key; did you mean clearance?"),
         ("clearance = 0.001\n" + BOX, "clearance must be 0 or > contact = 0.01 mm, got 0.001"),
         ('unit = "inch"\n' + BOX, "unit: must be 'mm', got 'inch'"),
-        ("include = 3\n" + BOX, "include: must be a text or a list, got 3"),
-        ("parts = 3\n", "parts: must be a table, got 3"),
         ("parts.p = 3\n", "parts.p: must have shape = one of"),
-        (BOX + "holes = [{ radius = 1 }, { radius = 1, at = [0, inf] }]\n", "parts.box.holes.1.at.1: must be a finite"),
-        (BOX + "[[motions]]\nparts = []\n", "motions.0.parts: must be of length at least 1, got []"),
         ('[parts."a b"]\nshape = "box"\nsize = [1, 1, 1]\n', "parts.a b: part name must not be empty or hold a space"),
         ('[parts.m]\nshape = "mesh"\nfile = "none.stl"\n', "none.stl"),
         ('[parts.p]\nshape = "clamp-part"\npart = "P8"\n', "parts.p.part: must be 'P1', 'P2'"),
@@ -200,27 +180,6 @@ def test_faults(text, message):
     assert line.startswith("scene.toml: ")
     assert message in line
     assert "\n" not in line
-
-
-def test_open_and_unreadable_meshes(tmp_path):
-    import trimesh
-
-    cube = trimesh.creation.box((10, 10, 10))
-    trimesh.Trimesh(cube.vertices, cube.faces[:-1]).export(tmp_path / "open.stl")
-    (tmp_path / "junk.stl").write_bytes(b"not a mesh")
-    table = '[parts.m]\nshape = "mesh"\nfile = "{}.stl"\nunit = "mm"\n'
-    assert not parse_scene(table.format("open"), folder=tmp_path).parts[0].shape.mesh.watertight
-    with pytest.raises(InputError, match=r"junk\.stl"):
-        parse_scene(table.format("junk"), folder=tmp_path)
-    with pytest.raises(InputError, match="no such file"):
-        load_scene(Path(tmp_path / "missing.toml"))
-
-
-@pytest.mark.parametrize("size", [1e-300, 1.0, 1e308])
-def test_a_turn_does_not_depend_on_how_long_its_axis_is(size):
-    turn = f"axis = [0, 0, {size}], angle_deg = 90"
-    scene = parse_scene(f"[parts.a]\nshape = 'box'\nsize = [1, 2, 3]\npose = {{ {turn} }}")
-    assert scene.parts[0].T_world[:3, :3] == pytest.approx(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), abs=1e-15)
 
 
 @given(st.tuples(*[st.floats(-720.0, 720.0)] * 3))

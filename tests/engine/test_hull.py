@@ -1,5 +1,6 @@
 """Hulls of points that nearly lie in faces, and meshes that are nearly convex."""
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -37,30 +38,16 @@ def test_no_point_is_left_out(rise, seed):
     assert len(made.vertices) - 1.5 * len(made.faces) + len(made.faces) == 2
 
 
-def plate(middle, n=8):
-    """A plate of 100 by 100 by 10 mm below z = 0: a grid whose small cell in the middle is a pyramid."""
-    g = np.concatenate([np.linspace(-50.0, -0.05, n), [0.05], np.linspace(1.0, 50.0, n)])
-    m, V, F = len(g), [], []
-    for z in (0.0, -10.0):
-        V += [(x, y, z) for x in g for y in g]
-    V.append((0.0, 0.0, middle))
-    for i in range(m - 1):
-        for j in range(m - 1):
-            a, b, c, d = i * m + j, (i + 1) * m + j, (i + 1) * m + j + 1, i * m + j + 1
-            if i == j == n - 1:
-                F += [(a, b, len(V) - 1), (b, c, len(V) - 1), (c, d, len(V) - 1), (d, a, len(V) - 1)]
-            else:
-                F += [(a, b, c), (a, c, d)]
-            F += [(m * m + a, m * m + c, m * m + b), (m * m + a, m * m + d, m * m + c)]
-        edge = m - 1
-        for p, q in (
-            (i * m, i * m + m),
-            (i * m + m + edge, i * m + edge),
-            (i + 1, i),
-            (edge * m + i, edge * m + i + 1),
-        ):
-            F += [(q, p, m * m + p), (q, m * m + p, m * m + q)]
-    return MeshShape(make_mesh(V, F), "off")
+def plate(middle):
+    """A plate of 100 by 100 by 10 mm below z = 0 with a pyramid of 0.1 by 0.1 mm on it, or in it below 0."""
+    block = manifold3d.Manifold.cube((100.0, 100.0, 10.0), True).translate((0.0, 0.0, -5.0))
+    base = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0.0, -0.1 if middle > 0.0 else 0.01)]
+    if middle > 0.0:
+        made = block + manifold3d.Manifold.hull_points([*base, (0.0, 0.0, middle)])
+    else:
+        made = block - manifold3d.Manifold.hull_points([*base, (0.0, 0.0, middle)])
+    mesh = made.to_mesh64()
+    return MeshShape(make_mesh(np.array(mesh.vert_properties)[:, :3], mesh.tri_verts), "off")
 
 
 def test_a_small_dent_is_not_filled():

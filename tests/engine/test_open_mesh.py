@@ -61,10 +61,9 @@ def tube():
     return shapes.MeshShape(make_mesh(V, F), "off", "tube")
 
 
-@pytest.mark.parametrize(("moving", "start", "way"), [("bead", -100.0, 400.0), ("tube", -900.0, 1000.0)])
-def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way(moving, start, way):
-    scene = Scene().add("tube", tube()).add("bead", shapes.box((3, 3, 3)), translation(0.3, 0.2, start))
-    go = Motion.translate((0.0, 0.0, way if moving == "bead" else -way), parts=moving)
+def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way():
+    scene = Scene().add("tube", tube()).add("bead", shapes.box((3, 3, 3)), translation(0.3, 0.2, -900.0))
+    go = Motion.translate((0.0, 0.0, -1000.0), parts="tube")
     assert check(replace(scene, motions=(go,))).motions[0].verdict.value == "uncertain"
 
 

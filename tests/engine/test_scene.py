@@ -186,6 +186,7 @@ def test_poses_inside_are_contained_as_a_check_says():
         (lambda: Scene().add("a", shapes.box((1, 1, 1))).add("a", shapes.box((1, 1, 1))), "'a' is there twice"),
         (lambda: Scene().add("a", SweptArc(7, 1, 50)), "make a part of it with groove_block"),
         (lambda: Scene().add("a", shapes.box((1, 1, 1)), np.eye(3)), r"pose of a must have shape \(4, 4\)"),
+        (lambda: shapes.box((1, 9e-10, 1)), "outline must be wider than 1e-09 mm"),
         (lambda: shapes.box((1, -1, 1)), "size must be a finite length > 0 mm, got -1"),
         (lambda: shapes.cylinder(5, 10, bore=6), "bore must be between 0 and radius = 5 mm, got 6"),
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 10, 20), "width must be > 11.78"),

@@ -43,13 +43,13 @@ def holds_on_way(a, b, way, start, until=1.0):
     assert_lower_on_way(low, a, b, [pose_at(way, t * until, start) for t in np.linspace(0.0, 1.0, 5)], cells=2000)
 
 
-@settings(SLOW, max_examples=10)
+@settings(SLOW, max_examples=7)
 @given(st.sampled_from(DRAWN), st.sampled_from(DRAWN), ways, poses(30.0), st.sampled_from([1.0, 0.3]))
 def test_no_time_of_a_stretch_is_below_its_bound(a, b, way, start, until):
     holds_on_way(a, b, way, start, until)
 
 
-@settings(SLOW, max_examples=10)
+@settings(SLOW, max_examples=7)
 @given(
     st.floats(0.5, 4.0),
     st.floats(4.0, 20.0),
@@ -92,14 +92,14 @@ def test_turns_that_are_carried_across_their_axis(seed):
     assert pair.between(0.0, 1.0) <= least
 
 
-@settings(SLOW, max_examples=6)
+@settings(SLOW, max_examples=5)
 @given(st.sampled_from(DRAWN + FACETED), st.sampled_from(DRAWN), ways, poses(25.0))
 def test_least_distances_and_first_contacts(a, b, way, start):
     assert_motion(min_clearance(a, b, way, start), a, b, way, start, tolerance=1e-5, cells=1500, times=5)
     assert_motion(first_contact(a, b, way, start), a, b, way, start, first=True, tolerance=1e-5, cells=1500, times=5)
 
 
-@settings(SLOW, max_examples=6)
+@settings(SLOW, max_examples=5)
 @given(
     st.builds(SweptArc, st.floats(5.0, 15.0), st.floats(0.3, 2.8), st.floats(5.0, 40.0)),
     st.builds(Cylinder, st.floats(1.0, 8.0), st.floats(2.0, 60.0)),
@@ -133,7 +133,7 @@ def test_what_is_inside_all_the_time_overlaps_all_the_time(outer):
             assert swept_lower(CACHE.model(a), CACHE.model(b), *stretch, angle=0.5 * way.angle) <= 0.0
 
 
-@settings(SLOW, max_examples=8)
+@settings(SLOW, max_examples=6)
 @given(st.floats(0.01, 0.99), st.floats(100.0, 2000.0), st.floats(0.05, 1.0), st.sampled_from([0, 1, 2]), st.booleans())
 @example(0.51, 1000.0, 0.5, 0, False)
 @example(0.49, 1000.0, 0.5, 1, True)
