@@ -105,7 +105,9 @@ class Distance:
     def moved(self, T: Array) -> Distance:
         """The same with points and normal taken along by ``T`` (4, 4)."""
         p, q = (None if x is None else to_target(T, x) for x in (self.point_a, self.point_b))
-        return replace(self, point_a=p, point_b=q, normal=None if self.normal is None else T[:3, :3] @ self.normal)
+        n = None if self.normal is None else T[:3, :3] @ self.normal
+        known = self.unique, self.level, self.method, self.estimate, self.interference
+        return Distance(self.lower, self.upper, p, q, n, *known)
 
     def swapped(self) -> Distance:
         """The distance of b and a in place of a and b."""

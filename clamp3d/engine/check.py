@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +105,7 @@ def check(
     log.end("broad phase")
     progress, on_row = progress or _ignore, on_row or _ignore
     questions = _Questions(scene, models, distances, depths)
-    rows = questions.rows(near.tolist(), box_gaps(boxes, near).tolist(), progress, on_row)
+    rows = questions.rows(_Pair.of(near, box_gaps(boxes, near), poses), progress, on_row)
     log.end("pairs")
     moved = check_motions(scene, models, named, progress)
     if scene.motions:
@@ -168,6 +169,23 @@ def _candidates(
     return np.array([pair for pair in near.tolist() if tuple(pair) in keep], dtype=np.int64).reshape(-1, 2)
 
 
+class _Pair(NamedTuple):
+    """Parts ``i`` and ``j``, whose boxes keep ``gap`` mm; ``T`` (4, 4) is j in i's frame, ``place`` it rounded."""
+
+    i: int
+    j: int
+    gap: float
+    T: Array
+    place: bytes
+
+    @classmethod
+    def of(cls, near: NDArray[np.int64], gaps: Array, poses: Array) -> list[_Pair]:
+        """Pairs ``near`` (m, 2) of parts at ``poses`` (n, 4, 4), whose boxes keep ``gaps`` (m,)."""
+        T = inverse(poses[near[:, 0]]) @ poses[near[:, 1]]
+        places = map(bytes, T[:, :3].round(_SAME) + 0.0)
+        return list(map(cls, near[:, 0].tolist(), near[:, 1].tolist(), gaps.tolist(), T, places))
+
+
 @dataclass(frozen=True)
 class _Questions:
     """What is asked of each pair of a scene; one answer serves pairs of equal shapes in equal relative poses."""
@@ -178,29 +196,26 @@ class _Questions:
     depths: bool
     _answers: dict[tuple[object, ...], tuple[Verdict, Distance]] = field(default_factory=dict)
 
-    def rows(self, near: list[list[int]], gaps: list[float], progress: Progress, on_row: OnRow) -> list[PairResult]:
-        """The rows of pairs ``near`` of parts, whose boxes keep ``gaps`` mm: all verdicts first, then the depths."""
+    def rows(self, pairs: list[_Pair], progress: Progress, on_row: OnRow) -> list[PairResult]:
+        """The rows of pairs of parts: all verdicts first, then the depths."""
         rows: list[PairResult] = []
-        for k, ((i, j), gap) in enumerate(zip(near, gaps, strict=True)):
-            progress("pairs", k, len(near))
-            rows.append(self._row(i, j, gap))
+        for k, pair in enumerate(pairs):
+            progress("pairs", k, len(pairs))
+            rows.append(self._row(pair))
             on_row(rows[k])
         overlaps = [k for k, row in enumerate(rows) if row.verdict in BAD] if self.depths else []
         for n, k in enumerate(sorted(overlaps, key=lambda k: rows[k].distance.upper)):
             progress("depths", n, len(overlaps))
-            i, j = near[k]
-            rows[k] = self._row(i, j, gaps[k], depth=True)
+            rows[k] = self._row(pairs[k], depth=True)
             on_row(rows[k])
         return rows
 
-    def _row(self, i: int, j: int, gap: float, *, depth: bool = False) -> PairResult:
-        """The row of parts ``i`` and ``j``, whose boxes keep ``gap`` mm."""
-        first, second = self.scene.parts[i], self.scene.parts[j]
-        a, b = self.models[i], self.models[j]
+    def _row(self, pair: _Pair, *, depth: bool = False) -> PairResult:
+        first, second = self.scene.parts[pair.i], self.scene.parts[pair.j]
+        a, b, T = self.models[pair.i], self.models[pair.j], pair.T
         allowance = self.scene.allowance(first.name, second.name)
-        T = inverse(first.T_world) @ second.T_world
-        key = (a, b, allowance, tuple((T[:3] + 0.0).round(_SAME).ravel().tolist()))
-        start = Distance(gap, level="boxes", method="bounding boxes")
+        key = (a, b, allowance, pair.place)
+        start = Distance(pair.gap, level="boxes", method="bounding boxes")
         try:
             if key not in self._answers:
                 self._answers[key] = self._answer(a, b, T, start, allowance)

@@ -190,7 +190,7 @@ class Scene:
 
     def allowance(self, a: str, b: str) -> float | None:
         """Allowed overlap of a pair in mm; None if even contact is not meant."""
-        return self._allowances.overlap(a, b)
+        return self._allowances.overlap(a, b) if self.allowed else None
 
 
 def name_pairs(name: str, pairs: object) -> list[tuple[str, str]]:
