@@ -53,7 +53,7 @@ _FEATURES = tuple(Feature)
 
 VECTOR = (np.float64, 3)
 TWIST = (np.float64, 6)
-_RECORD = np.dtype(
+RECORD = np.dtype(
     [
         ("distance", np.float64),
         ("point_on_groove", *VECTOR),
@@ -68,6 +68,7 @@ _RECORD = np.dtype(
     align=True,
 )
 """What the kernel writes: the fields of `SignedDistance` in their order."""
+_NO_DISTANCES = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,10 +157,10 @@ def _unit_axes(T: Array) -> Array:
 
 @functools.cache
 def kernel() -> ModuleType:
-    """Return the compiled entry points, loaded (or compiled, with a notice on stderr) on first use."""
-    from clamp3d.kernel import entries as module
+    """The compiled entry points, loaded (or compiled, with a notice on stderr) on first use."""
+    from clamp3d.kernel import entries
 
-    return module
+    return entries
 
 
 def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> SignedDistance:
@@ -200,9 +201,14 @@ def signed_distance(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) ->
     if type(groove) is not SweptArc or type(cylinder) is not Cylinder:
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    out = np.empty(1, _RECORD)
+    out = np.empty(1, RECORD)
     half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, type(cylinder) is Cylinder
-    if kernel().records(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, out) >= 0:
+    if (
+        kernel().measure(
+            T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, _NO_DISTANCES, out
+        )
+        >= 0
+    ):
         return signed_distance(groove, cylinder, check_pose(T))
     values: list[Any] = [*out.tolist()[0], (groove, cylinder, T)]
     values[4] = _FEATURES[values[4]]
@@ -268,30 +274,30 @@ def signed_distances(
     if workers is not None:
         workers = whole("workers", workers, least=1)
     out = _measured(groove, cylinder, T, full, workers)
-    return SignedDistances(**{name: out[name] for name in _RECORD.names or ()}) if full else out
+    return SignedDistances(**{name: out[name] for name in RECORD.names or ()}) if full else out
 
 
 def _measured(groove: SweptArc, cylinder: AnyCylinder, T: Array, full: bool, workers: int | None) -> NDArray[Any]:
     """Distances (n,) or full records of the kernel for poses (n, 4, 4) or (n, 2, 3), shared by threads."""
+    from concurrent.futures import ThreadPoolExecutor
+
     n = len(T)
-    run = kernel().records if full else kernel().distances
-    out: NDArray[Any] = np.empty(n, _RECORD if full else np.float64)
-    threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
+    half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, isinstance(cylinder, Cylinder)
+    distances, records = np.empty(0 if full else n), np.empty(n if full else 0, RECORD)
 
     def part(start: int, stop: int) -> bool:
-        half, along, flat = 0.5 * groove.length, 0.5 * cylinder.length, isinstance(cylinder, Cylinder)
-        rows = out[start:stop]
-        return int(run(T[start:stop], groove.radius, groove.half_angle, half, cylinder.radius, along, flat, rows)) < 0
+        rows = distances[start:stop], records[start:stop]
+        sizes = groove.radius, groove.half_angle, half, cylinder.radius, along
+        return int(kernel().measure(T[start:stop], *sizes, flat, *rows)) < 0
 
+    threads = min(workers or os.cpu_count() or 1, max(1, n // 4096))
+    cuts = [n * i // threads for i in range(threads + 1)]
     if threads == 1:
         is_done = part(0, n)
     else:
-        from concurrent.futures import ThreadPoolExecutor
-
-        cuts = [n * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:
             is_done = all(pool.map(part, cuts[:-1], cuts[1:]))
     if is_done:
-        return out
+        return records if full else distances
     mended = _unit_axes(T) if T.shape[1] == 2 else check_pose_array(T)
     return _measured(groove, cylinder, mended, full, workers)

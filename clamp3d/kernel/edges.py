@@ -9,8 +9,7 @@ stretches of the arc are halved until each is proven to hold nothing lower, or e
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,24 +21,19 @@ STRETCHES = 400
 """Stretches of an arc that are looked at; then the search ends with a wider bound, which it tells."""
 
 # What `root` solves, with w and t as above, g = w - r, e = |t| - half:
-RIM, SIDE, RIDGE, MIDDLE = range(4)
+RIM, SIDE, RIDGE, MIDDLE = map(float, range(4))  # numba would compile `root` once for each integer
 """The least distance from the rim, from the axis; where g = e; where t = 0."""
 
 
-class Line(NamedTuple):
-    """The edge ``foot + p direction``, lo <= p <= hi, from the cylinder's middle; the foot is square to it."""
+class Edge(NamedTuple):
+    """A line ``foot + p direction``, or the arc of radius R about ``foot``, p from its deepest point; of a line R is 0.
+
+    The foot is given from the axis' point at ``off``: of a line the cylinder's middle, of an arc the one next to it.
+    """
 
     foot: Vector
     direction: Vector
-    lo: float
-    hi: float
-
-
-class EndArc(NamedTuple):
-    """An end arc: its radius, and its centre from the axis' nearest point, which is at ``off`` on it."""
-
     R: float
-    centre: Vector
     off: float
 
 
@@ -94,44 +88,25 @@ def from_axis(rod: Rod, point: Vector) -> tuple[float, float]:
     return length(plus(point, -t, rod.axis)), t
 
 
-@inlined
-def tilt2(line: Line, rod: Rod) -> float:
-    """Square of the sine of the angle between line and axis."""
-    normal = cross(line.direction, rod.axis)
-    return dot(normal, normal)
-
-
 @formula
-def line_course(line: Line, rod: Rod, p: float) -> Course:
-    """w and t at a place of a line."""
-    point = plus(line.foot, p, line.direction)
-    t = dot(point, rod.axis)
+def course_at(edge: Edge, rod: Rod, p: float) -> Course:
+    """w and t at a place of an edge; on the axis w has no rates, and 0 stands for them."""
+    point, first, second, square = plus(edge.foot, p, edge.direction), edge.direction, Vector(0.0, 0.0, 0.0), 1.0
+    if edge.R > 0.0:
+        sine, cosine, square = edge.R * math.sin(p), edge.R * math.cos(p), edge.R * edge.R
+        first, second = Vector(cosine, sine, 0.0), Vector(-sine, cosine, 0.0)
+        point = plus(edge.foot, 1.0, Vector(sine, -cosine, 0.0))
+    t, t1, t2 = dot(point, rod.axis), dot(first, rod.axis), dot(second, rod.axis)
     across = plus(point, -t, rod.axis)
     w = length(across)
-    w1 = dot(line.direction, across) / w if w > 0.0 else 0.0
-    return Course(w, t, w1, dot(line.direction, rod.axis), (tilt2(line, rod) - w1 * w1) / w if w > 0.0 else 0.0, 0.0)
-
-
-@formula
-def arc_course(arc: EndArc, rod: Rod, angle: float) -> Course:
-    """w and t at an angle from the arc's deepest point; the rates of w are infinite on the axis."""
-    d = rod.axis
-    sine, cosine = arc.R * math.sin(angle), arc.R * math.cos(angle)
-    point = plus(arc.centre, 1.0, Vector(sine, -cosine, 0.0))
-    t = dot(point, d)
-    across = plus(point, -t, d)
-    w = length(across)
-    t1 = cosine * d.x + sine * d.y
-    t2 = cosine * d.y - sine * d.x
     if w == 0.0:
-        return Course(w, t + arc.off, math.inf, t1, math.inf, t2)
-    w1 = (across.x * cosine + across.y * sine) / w
-    w2 = (arc.R * arc.R - t1 * t1 + across.y * cosine - across.x * sine - w1 * w1) / w
-    return Course(w, t + arc.off, w1, t1, w2, t2)
+        return Course(0.0, t + edge.off, 0.0, t1, 0.0, t2)
+    w1 = dot(across, first) / w
+    return Course(w, t + edge.off, w1, t1, (square - t1 * t1 + dot(across, second) - w1 * w1) / w, t2)
 
 
 @inlined
-def equation(kind: int, rod: Rod, course: Course, side: float) -> tuple[float, float]:
+def equation(kind: float, rod: Rod, course: Course, side: float) -> tuple[float, float]:
     """Left side of what `root` solves and its slope; ``side`` is the sign of t."""
     w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
     g, e = course.w - rod.r, side * course.t - rod.half
@@ -146,24 +121,13 @@ def equation(kind: int, rod: Rod, course: Course, side: float) -> tuple[float, f
 
 
 @formula
-def root(
-    course_of: Callable[[Any, Rod, float], Course],
-    curve: Any,
-    rod: Rod,
-    kind: int,
-    lo: float,
-    hi: float,
-    start: float,
-    size: float,
-) -> float:
-    """Root of a monotone function on lo <= p <= hi, or the end beyond which it lies: Newton's steps, else halving.
-
-    ``size`` is that of the lengths (of a line) or angles that p is reckoned from.
-    """
+def root(edge: Edge, rod: Rod, kind: float, lo: float, hi: float, start: float) -> float:
+    """Root of a monotone function on lo <= p <= hi, or the end beyond which it lies: Newton's steps, else halving."""
+    size = 1.0 if edge.R > 0.0 else length(edge.foot)  # of the angles or lengths that p is reckoned from
     p = start
-    side = 1.0 if course_of(curve, rod, p).t >= 0.0 else -1.0
+    side = 1.0 if course_at(edge, rod, p).t >= 0.0 else -1.0
     for k in range(60):
-        value, slope = equation(kind, rod, course_of(curve, rod, p), side)
+        value, slope = equation(kind, rod, course_at(edge, rod, p), side)
         if value == 0.0:
             break
         if (value > 0.0) == (kind < RIDGE or slope > 0.0):
@@ -172,7 +136,7 @@ def root(
             lo = p
         if k == 0:  # the end that it leads to is tried first: often the root is beyond it
             end = lo if hi == p else hi
-            if (equation(kind, rod, course_of(curve, rod, end), side)[0] > 0.0) == (value > 0.0):
+            if (equation(kind, rod, course_at(edge, rod, end), side)[0] > 0.0) == (value > 0.0):
                 return end
         step = value / slope if slope != 0.0 else math.inf
         if abs(step) <= 1e-16 * (abs(p) + size):
@@ -187,25 +151,26 @@ def root(
 
 
 @inlined
-def improved(best: Place, course_of: Callable[[Any, Rod, float], Course], curve: Any, rod: Rod, p: float) -> Place:
+def improved(best: Place, edge: Edge, rod: Rod, p: float) -> Place:
     """The best so far, or a place of an edge."""
-    course = course_of(curve, rod, p)
+    course = course_at(edge, rod, p)
     f = cylinder_distance(rod, course.w, course.t)
     return Place(f, p, best.left) if f < best.f else best
 
 
 @formula
-def on_line(rod: Rod, line: Line, limit: float) -> Place:
-    """Least f on a line. What cannot be below ``limit`` is not looked for: then the value is infinite.
+def on_line(rod: Rod, line: Edge, lowest: float, highest: float, limit: float) -> Place:
+    """Least f on a line, lowest <= p <= highest, whose foot is square to it.
 
+    What cannot be below ``limit`` is not looked for: then the value is infinite.
     Between the point nearest to the axis and the one nearest to the middle plane w and |t| go opposite ways.
     """
-    along, across2 = dot(line.direction, rod.axis), tilt2(line, rod)
-    t0 = dot(line.foot, rod.axis)
-    b = min(max(-t0 / along, line.lo), line.hi) if along != 0.0 else math.inf
-    a = min(max(along * t0 / across2, line.lo), line.hi) if across2 > 0.0 else b
+    along, normal = dot(line.direction, rod.axis), cross(line.direction, rod.axis)
+    t0, across2 = dot(line.foot, rod.axis), dot(normal, normal)
+    b = min(max(-t0 / along, lowest), highest) if along != 0.0 else math.inf
+    a = min(max(along * t0 / across2, lowest), highest) if across2 > 0.0 else b
     b = a if along == 0.0 else b
-    at_a, at_b = line_course(line, rod, a), line_course(line, rod, b)
+    at_a, at_b = course_at(line, rod, a), course_at(line, rod, b)
     ga, ea = at_a.w - rod.r, abs(at_a.t) - rod.half
     gb, eb = at_b.w - rod.r, abs(at_b.t) - rod.half
     if ea <= min(ga, 0.0) or a == b:
@@ -216,18 +181,17 @@ def on_line(rod: Rod, line: Line, limit: float) -> Place:
         return Place(eb, b, math.inf)
     best = Place(phi(ga, ea), a, math.inf) if phi(ga, ea) <= phi(gb, eb) else Place(phi(gb, eb), b, math.inf)
     lo, hi, middle = min(a, b), max(a, b), 0.5 * (a + b)
-    size = length(line.foot)
     if ga <= ea and gb >= eb:  # where side and end are equally far, which is the least inside
-        p = root(line_course, line, rod, RIDGE, lo, hi, middle, size)
-        best = improved(best, line_course, line, rod, p)
+        p = root(line, rod, RIDGE, lo, hi, middle)
+        best = improved(best, line, rod, p)
         if best.f <= 0.0:
             return best
     # The rim from outside: from just beyond the end on, where it begins to pull against the side.
-    side = 1.0 if line_course(line, rod, middle).t >= 0.0 else -1.0
+    side = 1.0 if course_at(line, rod, middle).t >= 0.0 else -1.0
     near = (side * rod.half * (1.0 + 1e-6) - t0) / along if along != 0.0 else middle
     start = near if lo < near < hi else middle
-    p = root(line_course, line, rod, RIM, lo, hi, start, size)
-    return improved(best, line_course, line, rod, p)
+    p = root(line, rod, RIM, lo, hi, start)
+    return improved(best, line, rod, p)
 
 
 @inlined
@@ -241,11 +205,11 @@ def fall(slope: float, bend: float, third: float, reach: float) -> float:
 
 
 @inlined
-def stretch_about(arc: EndArc, rod: Rod, course: Course, half: float) -> Stretch:
+def stretch_about(arc: Edge, rod: Rod, course: Course, half: float) -> Stretch:
     """The ranges on a stretch of an arc that reaches ``half`` rad to both sides."""
     tilt = arc.R * math.sqrt(rod.e2)
     # Largest derivatives of w^2 by the angle; t is at most ``tilt`` from off.
-    slope = 2.0 * arc.R * math.sqrt(arc.centre.x * arc.centre.x + arc.centre.y * arc.centre.y)
+    slope = 2.0 * arc.R * math.sqrt(arc.foot.x * arc.foot.x + arc.foot.y * arc.foot.y)
     first, second, third = slope + tilt * tilt, slope + 2.0 * tilt * tilt, slope + 4.0 * tilt * tilt
     g, e = course.w - rod.r, abs(course.t) - rod.half
     low = max(math.sqrt(max(course.w * course.w - first * half, 0.0)), course.w - arc.R * half)  # the least w
@@ -277,7 +241,7 @@ def bound_by_mixture(stretch: Stretch, course: Course, f: float) -> float:
 
 
 @inlined
-def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int, float]:
+def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[float, float]:
     """What to solve for the one minimum of a stretch (-1: not known), and the slope if f is monotone (else 0)."""
     s, side = stretch, 1.0 if course.t >= 0.0 else -1.0
     w1, w2, e1, e2 = course.w1, course.w2, side * course.t1, side * course.t2
@@ -286,28 +250,28 @@ def one_minimum(stretch: Stretch, course: Course, rim_third: float) -> tuple[int
         bend = w1 * w1 + s.g * w2 + e1 * e1 + s.e * e2
         if rim_third * s.half < bend:
             return RIM, 0.0
-        return -1, slope if abs(slope) > (abs(bend) + 0.5 * rim_third * s.half) * s.half else 0.0
+        return -1.0, slope if abs(slope) > (abs(bend) + 0.5 * rim_third * s.half) * s.half else 0.0
     if s.e_high <= min(s.g_low, 0.0):  # all of it beside the side
         if w2 > s.third * s.half:
             return SIDE, 0.0
-        return -1, w1 if abs(w1) > s.bend * s.half else 0.0
+        return -1.0, w1 if abs(w1) > s.bend * s.half else 0.0
     is_split = abs(course.t) <= s.tilt * s.half  # the sign of t may change
     if not is_split and abs(w1) > s.bend * s.half and abs(e1) > s.tilt * s.half:
-        return (-1, w1) if (w1 > 0.0) == (e1 > 0.0) else (RIDGE, 0.0)
-    return -1, 0.0
+        return (-1.0, w1) if (w1 > 0.0) == (e1 > 0.0) else (RIDGE, 0.0)
+    return -1.0, 0.0
 
 
 @inlined
-def end_arc_of(groove: Groove, rod: Rod, ez: float) -> EndArc:
+def end_arc_of(groove: Groove, rod: Rod, ez: float) -> Edge:
     """The arc of the end in the plane z = ez."""
     out = Vector(-rod.centre.x, -rod.centre.y, ez - rod.centre.z)
     off = dot(out, rod.axis)
-    return EndArc(groove.R, plus(out, -off, rod.axis), off)
+    return Edge(plus(out, -off, rod.axis), Vector(0.0, 0.0, 0.0), groove.R, off)
 
 
 @formula
 def settled(
-    arc: EndArc, rod: Rod, middle: float, course: Course, stretch: Stretch, best: Place, eps: float
+    arc: Edge, rod: Rod, middle: float, course: Course, stretch: Stretch, best: Place, eps: float
 ) -> tuple[Place, float]:
     """The best so far or that of a stretch, and a lower bound of what may be lower in it (infinite if nothing is)."""
     s = stretch
@@ -317,21 +281,21 @@ def settled(
         return best, math.inf
     lo, hi = middle - s.half, middle + s.half
     if f < 0.0 and abs(course.t) <= s.tilt * s.half < abs(course.t1):
-        best = improved(best, arc_course, arc, rod, root(arc_course, arc, rod, MIDDLE, lo, hi, middle, 1.0))
+        best = improved(best, arc, rod, root(arc, rod, MIDDLE, lo, hi, middle))
     # Third derivative of half the squared distance from the rim; that of the cylinder's middle bounds it too.
     rim_third = 3.0 * s.by * s.bend + s.g_high * s.third + 3.0 * s.tilt * s.tilt + s.e_high * s.tilt
     from_middle = arc.R * math.sqrt(rod.centre.x * rod.centre.x + rod.centre.y * rod.centre.y)
     rim_third = min(rim_third, from_middle + rod.r * s.third + rod.half * s.tilt)
     kind, slope = one_minimum(s, course, rim_third)
     if slope != 0.0:
-        return improved(best, arc_course, arc, rod, lo if slope > 0.0 else hi), math.inf
-    if kind < 0:
+        return improved(best, arc, rod, lo if slope > 0.0 else hi), math.inf
+    if kind < 0.0:
         return best, bound
-    angle = root(arc_course, arc, rod, kind, lo, hi, middle, 1.0)
-    end = arc_course(arc, rod, angle)
+    angle = root(arc, rod, kind, lo, hi, middle)
+    end = course_at(arc, rod, angle)
     if kind == RIDGE and cylinder_distance(rod, end.w, end.t) > 0.0:
         return best, bound
-    return improved(best, arc_course, arc, rod, angle), math.inf
+    return improved(best, arc, rod, angle), math.inf
 
 
 @formula
@@ -349,7 +313,7 @@ def on_arc(groove: Groove, rod: Rod, ez: float, limit: float, eps: float) -> Pla
         top -= 1
         looked += 1
         middle, half = middles[top], halves[top]
-        course = arc_course(arc, rod, middle)
+        course = course_at(arc, rod, middle)
         f = cylinder_distance(rod, course.w, course.t)
         if f < best.f:
             best = Place(f, middle, best.left)

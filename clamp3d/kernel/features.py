@@ -267,19 +267,19 @@ def multiplier(k: float, a: float, q: float, start: float, least: float) -> floa
 
 
 @inlined
-def stationary(k: float, a: float, q: float, is_nearest: bool) -> tuple[float, float]:
+def stationary(k: float, a: float, q: float, side: float) -> tuple[float, float]:
     """Where the distance of a point from an ellipse has a local minimum: cosine and sine from its major axis.
 
     They are C = a / (k + mu), S = q / mu with C^2 + S^2 = 1. Only the root mu > 0 (the least distance) and the largest
     mu < 0 (a local minimum on the other side of the major axis) are minima; solving for them this way loses no digits
     where the quartic's roots run together. On the major axis within the evolute there are two mirrored minima. C is
-    NaN where there is none.
+    NaN where there is none. ``side``: 1 for the first, -1 for the other.
     """
     if abs(q) <= TINY and abs(a) <= k:
         C = a / k
         S = math.sqrt(max(0.0, 1.0 - C * C))
-        return C, S if is_nearest else -S
-    if is_nearest:
+        return C, side * S
+    if side > 0.0:
         low = max(abs(q), math.sqrt(a * a + q * q) - k)
         mu = multiplier(k, a, q, low, low)
     else:
@@ -307,9 +307,12 @@ def end_circle(groove: Groove, rod: Rod, ez: float) -> EndCircle:
 
 
 @inlined
-def circle_point(groove: Groove, rod: Rod, circle: EndCircle, is_nearest: bool) -> Candidate:
-    """A local minimum of the distance from an end arc's circle; infinite if the axis' inside does not face the arc."""
-    C, S = stationary(rod.e2, circle.p, abs(rod.axis.z) * circle.v, is_nearest)
+def circle_point(groove: Groove, rod: Rod, circle: EndCircle, side: float) -> Candidate:
+    """A local minimum of the distance from an end arc's circle, ``side`` as in `stationary`.
+
+    It is infinite if the axis' inside does not face the arc.
+    """
+    C, S = stationary(rod.e2, circle.p, abs(rod.axis.z) * circle.v, side)
     q = Vector(groove.R * (S * circle.ex - C * circle.ey), groove.R * (S * circle.ey + C * circle.ex), circle.z)
     t = dot(minus(q, rod.centre), rod.axis)
     du = groove.R * (C - circle.p)
@@ -327,9 +330,9 @@ def on_end_arc(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> 
     """
     if circle.reach * circle.reach >= best.d2:
         return best
-    point = circle_point(groove, rod, circle, True)
+    point = circle_point(groove, rod, circle, 1.0)
     if point.d2 == math.inf and abs(circle.p) + abs(rod.axis.z * circle.v) < rod.e2:
-        point = circle_point(groove, rod, circle, False)
+        point = circle_point(groove, rod, circle, -1.0)
     return point if point.d2 < best.d2 else best
 
 

@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from clamp3d.kernel import features
-from clamp3d.kernel.edges import Line, cylinder_distance, from_axis, on_arc, on_line
+from clamp3d.kernel.edges import Edge, cylinder_distance, from_axis, on_arc, on_line
 from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.jit import formula, inlined
 from clamp3d.kernel.nearest import (
@@ -26,7 +26,6 @@ from clamp3d.kernel.nearest import (
     inside,
     inside_rate,
     mixture,
-    nearest,
     way_out,
 )
 from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus, times
@@ -113,12 +112,12 @@ def on_face(groove: Groove, rod: Rod, normal: Vector, level: float, search: Sear
 
 
 @formula
-def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint:
+def rim_point(rod: Rod, end: float, which: float, inset: float) -> RimPoint:
     """Local maximum of the distance from the groove's axis on a rim (end: 1, -1) of the cylinder less ``inset``.
 
-    The farthest point of the rim, or the other local maximum. Seen along the groove a rim is an ellipse; its farthest
-    points are found like the nearest ones of an end arc. Its minor axis is (ex, ey), the direction of the axis' part
-    across the groove, of length e; the major one (-ey, ex).
+    The farthest point of the rim (``which`` 1), or the other local maximum (-1). Seen along the groove a rim is an
+    ellipse; its farthest points are found like the nearest ones of an end arc. Its minor axis is (ex, ey), the
+    direction of the axis' part across the groove, of length e; the major one (-ey, ex).
     """
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
     d, e2, e = rod.axis, rod.e2, math.sqrt(rod.e2)
@@ -128,7 +127,7 @@ def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint
     b = abs(d.z)
     p = (ex * middle.y - ey * middle.x) / radius
     v = (ex * middle.x + ey * middle.y) / radius
-    S, C = features.stationary(e2, b * v, p, is_farthest)
+    S, C = features.stationary(e2, b * v, p, which)
     if math.isnan(S):
         return none
     # The minor axis in space: across the cylinder's axis, (ex dz, ey dz, -e), with the sign that makes ex, ey rise.
@@ -142,38 +141,38 @@ def rim_point(rod: Rod, end: float, is_farthest: bool, inset: float) -> RimPoint
 
 
 @formula
-def free_rim(groove: Groove, rod: Rod, end: float, is_farthest: bool) -> tuple[RimPoint, float]:
+def free_rim(groove: Groove, rod: Rod, end: float, which: float) -> tuple[RimPoint, float]:
     """The point of a rim that reaches behind the arc, shrunk until it just touches it, and by how much it is shrunk.
 
     Its rho is -1 if that is no candidate.
     """
     inset, most = 0.0, min(rod.r, rod.half)
     none = RimPoint(-1.0, rod.centre, 0.0, 0.0)
-    point = rim_point(rod, end, is_farthest, inset)
+    point = rim_point(rod, end, which, inset)
     for _ in range(60):
         rate = point.by_radius + point.by_length
         step = (point.rho - groove.R) / rate if rate > 0.0 else math.inf  # Newton's: convex, so it stays on this side
         if not inset + step < most:  # it never does: of a disc, what is left last
             if rod.r <= rod.half:
                 return none, most
-            point = rim_point(rod, end, is_farthest, most)
+            point = rim_point(rod, end, which, most)
             return (point, most) if point.rho >= groove.R else (none, most)
         inset += step
-        point = rim_point(rod, end, is_farthest, inset)
+        point = rim_point(rod, end, which, inset)
         if point.rho <= 0.0 or abs(point.rho - groove.R) <= 2.0 * UNIT * groove.R or abs(step) <= 1e-12 * groove.R:
             break
     return point, inset
 
 
 @formula
-def on_arc_surface(groove: Groove, rod: Rod, end: float, is_farthest: bool, search: Search) -> Search:
+def on_arc_surface(groove: Groove, rod: Rod, end: float, which: float, search: Search) -> Search:
     """The search with the arc surface against a rim, from inside."""
     R = groove.R
-    rim, inset = rim_point(rod, end, is_farthest, 0.0), 0.0
+    rim, inset = rim_point(rod, end, which, 0.0), 0.0
     if not (rim.rho > 0.0 and R - rim.rho <= search.limit):  # nor if a square has overflowed
         return search
     if rim.rho > R:
-        rim, inset = free_rim(groove, rod, end, is_farthest)
+        rim, inset = free_rim(groove, rod, end, which)
     if rim.rho <= 0.0 or abs(rim.point.z) > groove.H:
         return search
     scale = R / rim.rho if inset < min(rod.r, rod.half) else 1.0
@@ -203,7 +202,7 @@ def on_edge(
     """
     middle = dot(rod.centre, direction)
     foot = minus(plus(origin, middle, direction), rod.centre)
-    place = on_line(rod, Line(foot, direction, lo - middle, hi - middle), search.limit)
+    place = on_line(rod, Edge(foot, direction, 0.0, 0.0), lo - middle, hi - middle, search.limit)
     if place.f > search.limit:
         return search
     p = min(max(place.p + middle, lo), hi)
@@ -233,7 +232,7 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     search = on_face(groove, rod, Vector(0.0, 0.0, -1.0), H, search)
     outer = 1.0 if c.x * d.x + c.y * d.y >= 0.0 else -1.0  # the end farther from the groove's axis
     for k in range(4):
-        search = on_arc_surface(groove, rod, outer if k % 2 == 0 else -outer, k < 2, search)
+        search = on_arc_surface(groove, rod, outer if k % 2 == 0 else -outer, 1.0 if k < 2 else -1.0, search)
     if search.f < math.inf and search.limit <= search.least:
         return search
     is_above = c.y + rod.half * abs(d.y) + rod.r * math.sqrt(d.x * d.x + d.z * d.z) >= h
@@ -348,8 +347,10 @@ def is_of_capsule(rod: Rod, capsule: Answer) -> bool:
 
 
 @formula
-def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Vector]:
-    """Answer and rate where the capsule's are not the cylinder's."""
+def with_flat_ends(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Vector]:
+    """Signed distance of a flat-ended cylinder and its rate by a shift, from the answer of its capsule."""
+    if is_of_capsule(rod, capsule):
+        return capsule, capsule.normal
     least = capsule.distance
     if capsule.distance < -rod.r:
         least = -math.inf
@@ -371,12 +372,3 @@ def searched(groove: Groove, rod: Rod, capsule: Answer) -> tuple[Answer, Vector]
         rate = Vector(0.0, 0.0, 0.0)  # nothing is left of a disc, and its middle is not in the material yet
     bound += max(best.f - left, 0.0)
     return Answer(best.f, best.point, normal, best.feature, t, bound), rate
-
-
-@inlined
-def flat_nearest(groove: Groove, rod: Rod) -> tuple[Answer, Vector]:
-    """Signed distance of a flat-ended cylinder, and its rate by a shift."""
-    capsule = nearest(groove, rod)
-    if is_of_capsule(rod, capsule):
-        return capsule, capsule.normal
-    return searched(groove, rod, capsule)

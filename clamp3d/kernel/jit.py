@@ -18,45 +18,51 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 # IEEE arithmetic as written (no re-association), and division by zero gives inf instead of a Python exception.
 _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": True}
+# Code with which Python and C would call a function is a fifth of the time to compile. Formulas have none.
+_INTERNAL: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def formula(function: _F) -> _F:
-    """Decorator of a formula that only kernels call: compiled into them."""
-    compiled: _F = numba.njit(**_OPTIONS)(function)
+    """Decorator of a formula that only kernels call: compiled into them. Called from Python it ends the interpreter."""
+    compiled: _F = numba.njit(**_INTERNAL)(function)
     return compiled
 
 
 def inlined(function: _F) -> _F:
     """The same for a small formula: built into each caller."""
-    compiled: _F = numba.njit(forceinline=True, **_OPTIONS)(function)
+    compiled: _F = numba.njit(forceinline=True, **_INTERNAL)(function)
     return compiled
 
 
-def entry(function: _F) -> _F:
-    """Decorator of a kernel that Python calls; where numba finds no folder for its cache, every run compiles it."""
-    try:
-        compiled: _F = numba.njit(cache=True, **_OPTIONS)(function)
-    except RuntimeError:  # no folder can be written
-        _Notice.when = " in every run: set NUMBA_CACHE_DIR to a folder that can be written"
-        compiled = numba.njit(**_OPTIONS)(function)
-    return compiled
+def entry(signature: Any) -> Callable[[_F], _F]:
+    """Decorator of a kernel that Python calls with arguments of these types alone.
+
+    It is compiled, or taken from numba's cache, when its module is imported: all kernels of a module at once. Where
+    numba finds no folder for its cache, every run compiles them.
+    """
+
+    def decorate(function: _F) -> Any:
+        notice = _Notice()
+        with event.install_listener("numba:compile", notice):
+            try:
+                return numba.njit(signature, cache=True, **_OPTIONS)(function)
+            except RuntimeError:  # no folder can be written
+                notice.when = " in every run: set NUMBA_CACHE_DIR to a folder that can be written"
+                return numba.njit(signature, **_OPTIONS)(function)
+
+    return decorate
 
 
 class _Notice(event.Listener):
     """One line on stderr when numba begins to compile the first kernel."""
 
     when = ", once for this machine"
-
-    def __init__(self) -> None:
-        self.is_said = False
+    is_said = False
 
     def on_start(self, event: object) -> None:
-        if not self.is_said:
-            self.is_said = True
+        if not _Notice.is_said:
+            _Notice.is_said = True
             print(f"clamp3d: compiling the contact kernel{self.when} ...", file=sys.stderr, flush=True)
 
     def on_end(self, event: object) -> None:
         pass
-
-
-event.register("numba:compile", _Notice())

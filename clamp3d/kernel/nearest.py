@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from clamp3d.kernel import features
-from clamp3d.kernel.features import Candidate, EndCircle, Groove, Rod
+from clamp3d.kernel.features import Candidate, Groove, Rod
 from clamp3d.kernel.jit import formula, inlined
 from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus
 
@@ -159,48 +159,30 @@ def outside(groove: Groove, rod: Rod) -> Candidate:
     A feature whose line, or whose end's plane, is no nearer than the best so far is not looked at.
     """
     H, half, z = groove.H, rod.half, rod.centre.z
-    # Whether the axis reaches beyond the end faces, or level with them: an axis in the plane of an end face leaves it
-    # by less than rounding.
-    top, bottom = z + half * abs(rod.axis.z) >= H, z - half * abs(rod.axis.z) <= -H
-    is_through = top and bottom  # then its ends are far from S
     best = Candidate(math.inf, 0.0, features.ARC, rod.centre)
-    if not is_through:
-        best = features.on_axis_end(groove, rod, -half, best)
-        best = features.on_axis_end(groove, rod, half, best)
-    best = features.on_lip(groove, rod, -1.0, best)
-    best = features.on_lip(groove, rod, 1.0, best)
-    if top or bottom:
-        best = at_ends(groove, rod, best, top, bottom)
-    if is_through:
-        best = features.on_axis_end(groove, rod, -half, best)
-        best = features.on_axis_end(groove, rod, half, best)
+    for side in (-1.0, 1.0):
+        best = features.on_lip(groove, rod, side, best)
+    for end in (-1.0, 1.0):
+        # Whether the axis reaches beyond the end face, or level with it: an axis in its plane leaves it by less than
+        # rounding.
+        if end * z + half * abs(rod.axis.z) >= H:
+            best = at_end(groove, rod, end * H, best)
+    for end in (-half, half):
+        best = features.on_axis_end(groove, rod, end, best)
     return best
 
 
-@inlined
-def at_ends(groove: Groove, rod: Rod, best: Candidate, top: bool, bottom: bool) -> Candidate:
-    """The best so far, or a corner, an edge or an arc of the ends that the axis reaches."""
-    low, high = features.end_circle(groove, rod, -groove.H), features.end_circle(groove, rod, groove.H)
-    is_low_asked = is_high_asked = False
-    if bottom:
-        best, is_low_asked = at_end(groove, rod, low, best)
-    if top:
-        best, is_high_asked = at_end(groove, rod, high, best)
-    if is_low_asked:
-        best = features.on_end_arc(groove, rod, low, best)
-    if is_high_asked:
-        best = features.on_end_arc(groove, rod, high, best)
-    return best
-
-
-@inlined
-def at_end(groove: Groove, rod: Rod, circle: EndCircle, best: Candidate) -> tuple[Candidate, bool]:
-    """The best so far, or a corner or an edge of an end; whether a point of its arc may be nearer."""
-    best, falls = features.on_corner(groove, rod, -1.0, circle.z, best)
-    best, falls_too = features.on_corner(groove, rod, 1.0, circle.z, best)
+@formula
+def at_end(groove: Groove, rod: Rod, ez: float, best: Candidate) -> Candidate:
+    """The best so far, or a corner, an edge or the arc of the end in the plane z = ez."""
+    circle = features.end_circle(groove, rod, ez)
+    is_asked = has_two_minima(rod, circle.p, circle.v)
+    for side in (-1.0, 1.0):
+        best, falls = features.on_corner(groove, rod, side, ez, best)
+        is_asked = is_asked or falls
     if rod.centre.y + rod.half * abs(rod.axis.y) >= groove.h:
-        best = features.on_end_edge(groove, rod, circle.z, best)
-    return best, falls or falls_too or has_two_minima(rod, circle.p, circle.v)
+        best = features.on_end_edge(groove, rod, ez, best)
+    return features.on_end_arc(groove, rod, circle, best) if is_asked else best
 
 
 @inlined

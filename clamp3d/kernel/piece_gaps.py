@@ -9,15 +9,13 @@ negative on the piece's side of the lip and goes over into the plain distance on
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from clamp3d.geometry.pose import Array
 from clamp3d.kernel import features
 from clamp3d.kernel.features import Candidate, Groove, Rod
-from clamp3d.kernel.jit import entry, formula, inlined
+from clamp3d.kernel.jit import formula, inlined
 from clamp3d.kernel.nearest import edge_normal, is_parallel
-from clamp3d.kernel.pose_rows import rigid, rod_at
-from clamp3d.kernel.vector import Vector, cross, dot, length, minus, over, put
+from clamp3d.kernel.vector import Vector, dot, length, minus, over
 
 ARC_SURFACE, FACE_M, FACE_N, END_BELOW, END_ABOVE = range(5)
 
@@ -219,23 +217,3 @@ def place_inside(groove: Groove, rod: Rod) -> float:
     t = features.deepest(Groove(groove.R, groove.half_angle, groove.s, groove.h, endless), rod, lo, hi)
     p = features.axis_point(rod, t)
     return t if min(math.sqrt(p.x * p.x + p.y * p.y) - groove.R, groove.h - p.y) > 0.0 else math.nan
-
-
-@entry
-def pieces(T: Array, R: float, half_angle: float, H: float, r: float, half: float, out: Any) -> bool:
-    """The five pieces at one pose (1, 4, 4) into records (5,); False for a pose that is not rigid."""
-    if not rigid(T, 0):
-        return False
-    groove, rod = features.groove_of(R, half_angle, H), rod_at(T, 0, r, half)
-    t = place_inside(groove, rod)
-    for piece in range(5):
-        gap = end_gap(groove, rod, piece) if piece >= END_BELOW else free_gap(groove, rod, piece)
-        if piece < END_BELOW and not math.isnan(t):
-            gap = gap_inside(groove, rod, piece, t, gap)
-        row = out[piece]
-        row.distance, row.feature = gap.distance, gap.feature
-        put(row.point_on_groove, gap.point)
-        put(row.normal, gap.normal)
-        put(row.gradient[:3], gap.rate)
-        put(row.gradient[3:], cross(gap.axis_point, gap.rate))
-    return True

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.geometry.pose import Array, check_pose
 from clamp3d.geometry.primitives import AnyCylinder, Capsule, Cylinder, SweptArc, check_shapes
-from clamp3d.kernel.distance import TWIST, VECTOR, as_pose
+from clamp3d.kernel.distance import TWIST, VECTOR, as_pose, kernel
 
-_RECORD = np.dtype(
+PIECE_RECORD = np.dtype(
     [
         ("distance", np.float64),
         ("point_on_groove", *VECTOR),
@@ -93,10 +93,8 @@ def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> G
     if type(groove) is not SweptArc or type(cylinder) not in (Capsule, Cylinder):
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    out = np.empty(5, _RECORD)
-    from clamp3d.kernel.piece_gaps import pieces  # compiled on first use
-
+    out = np.empty(5, PIECE_RECORD)
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
-    if not pieces(T[None], groove.radius, groove.half_angle, half, cylinder.radius, along, out):
+    if not kernel().pieces(T, groove.radius, groove.half_angle, half, cylinder.radius, along, out):
         return groove_pieces(groove, cylinder, check_pose(T))
-    return GroovePieces(**{name: out[name] for name in _RECORD.names or ()})
+    return GroovePieces(**{name: out[name] for name in PIECE_RECORD.names or ()})

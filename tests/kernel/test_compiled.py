@@ -16,7 +16,7 @@ from clamp3d.kernel.jit import entry, formula
 def play(R, r):
     return R - r
 
-@entry
+@entry('float64(float64, float64)')
 def plays(R, r):
     return play(R, r)
 """

@@ -2,13 +2,19 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
 from clamp3d.geometry.pose import rotation
-from clamp3d.kernel.edges import on_arc
+from clamp3d.kernel import edges
 from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.vector import Vector
+
+
+@numba.njit(error_model="numpy")
+def on_arc(groove, rod, ez, limit, eps):
+    return edges.on_arc(groove, rod, ez, limit, eps)
 
 
 def _beside(P, r, l, c, d):  # noqa: E741
