@@ -27,6 +27,15 @@ def test_an_optimiser_and_a_grid_agree() -> None:
     assert score.asked["equilibria named"] == 1
 
 
+def test_the_open_clamp_overlaps_nothing_at_any_tilt() -> None:
+    for k in range(60):
+        section = Section(whole_clamp(np.random.default_rng([9, k])), Cas())
+        for tilt in section.clamp.tilt_stop * np.linspace(-1.0, 1.0, 5):
+            gaps = section.gaps(section.open_state(section.open_distance(), tilt))
+            apart = [gap for gap, pair in zip(gaps.value, gaps.pair, strict=True) if pair != ("P2", "P3")]
+            assert min(apart) >= -1e-9, k
+
+
 @pytest.mark.parametrize("joints", [Joints(), Joints(hole=True, saddle=True, washer=True)])
 def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joints: Joints) -> None:
     """An optimiser that knows neither states nor multipliers closes as far, and the edge carries the bolt's force."""
