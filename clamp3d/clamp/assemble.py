@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel, check_model
@@ -177,12 +178,8 @@ def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState |
         by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
         taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
         return Closing(start, final.held, final.q, by_hand, taken), final
-    moves: Any = {"step": settings.step, "tilt_step": settings.tilt_step, "progress": settings.progress}
-    stepped = (
-        solve_stepped(section, **moves)
-        if settings.solver == "stepped"
-        else solve_bisection(section, resolution=RESOLUTION, **moves)
-    )
+    solve = solve_stepped if settings.solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
+    stepped = solve(section, step=settings.step, tilt_step=settings.tilt_step, progress=settings.progress)
     return Closing(start, stepped.q, stepped.q, [], []), stepped
 
 
