@@ -7,10 +7,10 @@ numbers; what it would misread is refused here. This runs in the process for for
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import math
-import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,13 @@ from urllib.parse import unquote
 
 import numpy as np
 import trimesh
-from trimesh.resolvers import FilePathResolver
 
 from clamp3d.checks import shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.placing import Placer
-from clamp3d.files.worker import OUTSIDE
+from clamp3d.files.worker import named_file
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import UNIT_TOLERANCE
 
@@ -45,24 +44,6 @@ _NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a whole number is divided by where an accessor says "normalized"."""
 
 
-class _Buffers(FilePathResolver):
-    """Gives trimesh the binary part of a GLB as the file without a name, and files of the same folder."""
-
-    def __init__(self, path: Path, binary: bytes) -> None:
-        super().__init__(str(path), allow_anywhere=os.environ.get(OUTSIDE) == "1")
-        self._binary = binary
-
-    def get(self, name: str) -> bytes:
-        if not name:
-            return self._binary
-        try:
-            return self.absolute(unquote(name)).read_bytes()
-        except ValueError:
-            raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that") from None
-        except OSError as error:
-            raise InputError(f"names {shown(name)}: {error.strerror}") from None
-
-
 def read_gltf(path: Path, unit: str | None) -> Reading:
     """The meshes of a glTF or GLB file. Raises InputError if it is damaged, or holds what cannot be read."""
     tree, binary = _parts(path)
@@ -73,8 +54,13 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
     names = [node.get("name") or tree["meshes"][node.get("mesh", 0)].get("name") for node in tree["nodes"]]
     meshes = {k: _Mesh(tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
     _simplify(tree, meshes)
-    raw, buffers = io.BytesIO(json.dumps(tree).encode()), _Buffers(path, binary)
-    scene = trimesh.load_scene(raw, file_type="gltf", resolver=buffers, process=False, skip_materials=True)
+    for buffer in tree.get("buffers", []):
+        uri = buffer.get("uri", "")
+        if not uri.startswith("data:"):
+            raw = _beside(path, unquote(uri)) if uri else binary
+            buffer["uri"] = f"data:;base64,{base64.b64encode(raw).decode()}"
+    text = io.BytesIO(json.dumps(tree).encode())
+    scene = trimesh.load_scene(text, file_type="gltf", process=False, skip_materials=True)
     for key, piece in scene.geometry.items():  # "7", "7_1", ...: the primitives of mesh 7, in their order
         meshes[int(key.partition("_")[0])].pieces.append(piece)
     for n in nodes:
@@ -110,6 +96,14 @@ def _parts(path: Path) -> tuple[dict[str, Any], bytes]:
         listed = ", ".join(map(str, required))
         raise InputError(f"needs {listed}, which is not read; export without compression")
     return tree, binary
+
+
+def _beside(path: Path, name: str) -> bytes:
+    """What is in a file that the file at ``path`` names. Raises InputError."""
+    try:
+        return named_file(path, name).read_bytes()
+    except OSError as error:
+        raise InputError(f"names {shown(name)}: {error.strerror}") from None
 
 
 def _nodes(tree: dict[str, Any]) -> list[int]:
@@ -175,5 +169,3 @@ def _simplify(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> None:
         {"name": str(k), "primitives": meshes[k].primitives if k in meshes else []}
         for k in range(len(tree.get("meshes", [])))
     ]
-    for buffer in tree.get("buffers", []):
-        buffer.setdefault("uri", "")

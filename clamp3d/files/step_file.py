@@ -21,7 +21,7 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.cad import Key, Node, bodies_of
 from clamp3d.files.open_cascade import explore, matrix, occ
 from clamp3d.files.part21 import Announced, announced
-from clamp3d.files.worker import OUTSIDE, may_read
+from clamp3d.files.worker import named_file
 
 _OTHERS = re.compile(
     "CSG_SOLID|(EXTRUDED|REVOLVED)_AREA_SOLID|SWEPT_FACE_SOLID|SOLID_REPLICA|TESSELLATED_(SOLID|SHELL)"
@@ -53,10 +53,8 @@ def _contents(path: Path) -> list[Announced]:
     waiting = [*contents[path].files]
     while waiting:
         name = waiting.pop()
-        if (file := path.parent / name) in contents:
+        if (file := named_file(path, name)) in contents:
             continue
-        if not may_read(file, path.parent):
-            raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that")
         try:
             readable_file(file)
             _open(file)

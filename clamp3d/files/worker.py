@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clamp3d.checks import readable_file, short
+from clamp3d.checks import readable_file, short, shown
 from clamp3d.errors import InputError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 
@@ -78,6 +78,13 @@ def read_in_process(path: Path, option: Any = None) -> Reading:
 def may_read(file: Path, folder: Path) -> bool:
     """Whether a file that another one names may be read: it is in the ``folder``, or the user allows all."""
     return os.environ.get(OUTSIDE) == "1" or file.resolve().is_relative_to(folder.resolve())
+
+
+def named_file(path: Path, name: str) -> Path:
+    """The file beside ``path`` that this file names. Raises InputError unless it may be read."""
+    if not may_read(path.parent / name, path.parent):
+        raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that")
+    return path.parent / name
 
 
 def _factor() -> float:
