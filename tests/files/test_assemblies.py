@@ -4,9 +4,8 @@ import pytest
 
 pytest.importorskip("bd_warehouse")
 
-from assemblies import ASSEMBLIES, judged, near, nudged, truth, write_step
-
 from clamp3d import check, load
+from tests.files.assemblies import ASSEMBLIES, judged, near, nudged, truth, write_step
 
 
 # scripts/measure-step does the same for the bearing and larger ones, as drawn and moved in several ways.

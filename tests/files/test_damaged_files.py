@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from threemf import TIP, doubled, write_3mf
 
 from clamp3d import InputError, check, load
 from clamp3d.files.bodies import unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
+from tests.files.threemf import TIP, doubled, write_3mf
 
 ROOT = Path(__file__).parents[2]
 PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()

@@ -45,9 +45,9 @@ def test_what_is_no_body_is_refused():
 def test_shapes_of_open_cascade_and_of_cadquery():
     pytest.importorskip("OCP")
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-    from step_scenes import pin, plate, pose
 
     from tests.cad import location
+    from tests.files.step_scenes import pin, plate, pose
 
     assert volumes(load(BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
     # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.

@@ -14,13 +14,13 @@ from OCP.gp import gp_Pnt
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_StepModelType
 from OCP.TopoDS import TopoDS_Compound
-from step_scenes import nested, pin, plate, pose
 
 from clamp3d import InputError, export, load
 from clamp3d.files.formats import load_bodies
 from clamp3d.files.open_cascade import explore
 from clamp3d.geometry.shells import volume
 from tests.cad import Tree, location
+from tests.files.step_scenes import nested, pin, plate, pose
 
 
 @pytest.fixture(scope="module")

@@ -1,21 +1,17 @@
 """Features of STEP solids are their cylindrical faces: no other face is one, and arcs apart stay apart."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("OCP")
-sys.path.insert(0, str(Path(__file__).parents[1] / "files"))
-
-from assemblies import box, cone, cut, fuse, ring, rod, shift, solid_of, write_step
 
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cad import cad_features
 from clamp3d.fit.fit import fit_file
+from tests.files.assemblies import box, cone, cut, fuse, ring, rod, shift, solid_of, write_step
 
 
 def features(shape, T=None):

@@ -4,7 +4,8 @@ import json
 import re
 
 import trimesh
-from fit_shapes import RADIUS, splint
+
+from tests.fit.fit_shapes import RADIUS, splint
 
 
 def test_table_json_and_page(tmp_path, main):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import trimesh
-from fit_shapes import CENTRE_HEIGHT, CENTRES, HALF, LENGTH, RADIUS, off_groove, prism, scan, splint
 
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.geometry.mesh import make_mesh
+from tests.fit.fit_shapes import CENTRE_HEIGHT, CENTRES, HALF, LENGTH, RADIUS, off_groove, prism, scan, splint
 
 
 def fitted(mesh, *, T=None, sigma=0.0, seed=0, float32=True):

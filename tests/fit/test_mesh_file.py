@@ -4,11 +4,11 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
-from fit_shapes import RADIUS, splint
 
 from clamp3d.errors import InputError
 from clamp3d.fit.fit import fit_file, fit_mesh
 from clamp3d.geometry.mesh import make_mesh
+from tests.fit.fit_shapes import RADIUS, splint
 
 
 @pytest.fixture(scope="module")
