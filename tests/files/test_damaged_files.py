@@ -121,6 +121,12 @@ def test_objects_components_and_build_items_of_3mf(tmp_path):
     np.testing.assert_allclose(np.ptp(third.shape.mesh.vertices, axis=0), 2 * 25.4, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("unit", "mm"), [("micron", 1e-3), ("centimeter", 10.0), ("meter", 1e3), ("foot", 304.8)])
+def test_units_of_3mf(tmp_path, unit, mm):
+    (part,) = load(write_3mf(tmp_path / "a.3mf", unit=unit)).parts
+    np.testing.assert_allclose(np.ptp(part.shape.mesh.vertices, axis=0), mm, rtol=1e-6)
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_turn_of_six_digits_is_a_turn(tmp_path):
     build = '<item objectid="1" transform="0.955336 0.29552 0 -0.29552 0.955336 0 0 0 1 0 0 0"/>'

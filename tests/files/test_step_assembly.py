@@ -153,11 +153,15 @@ def test_coloured_and_layered_faces_are_read(tmp_path):
     box = BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
     label = tree.product("box", box)
     face = tree.tool.AddSubShape(label, TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_FACE).Current())
-    red = Quantity_Color(Quantity_NameOfColor.Quantity_NOC_RED)
-    XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(face, red, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+    for item, colour in ((face, "Quantity_NOC_RED"), (label, "Quantity_NOC_BLUE")):
+        XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(
+            item, Quantity_Color(getattr(Quantity_NameOfColor, colour)), XCAFDoc_ColorType.XCAFDoc_ColorSurf
+        )
     XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main()).SetLayer(label, TCollection_ExtendedString("outer"))
     scene = load(tree.write(tmp_path / "coloured.step"))
     assert [part.name for part in scene.parts] == ["box"]
+    component = scene.parts[0].component
+    assert (component.colour, component.face_colours) == ("#0000FF", {0: "#FF0000"})
     mesh = scene.parts[0].shape.mesh
     assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)
 

@@ -17,6 +17,7 @@ def folder(tmp_path):
     made.mkdir()
     trimesh.creation.box((2.0, 4.0, 6.0)).export(made / "plate.stl")
     trimesh.creation.cylinder(1.0, 5.0, sections=16).export(made / "bolt.ply")
+    (made / "notes.txt").write_text("left out")
     return made
 
 
