@@ -43,4 +43,4 @@ class Report(Source, Method):
         if review.assembly is not None:
             finish(not review.passed)
         else:
-            finish(verdicts={row.result.verdict for row in (*review.rows, *review.motions)})
+            finish(verdicts={row.verdict for row in (*review.rows, *review.motions)})

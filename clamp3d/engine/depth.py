@@ -16,6 +16,7 @@ from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.mesh_distance import are_apart, rounding_of
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest
+from clamp3d.engine.refine import SHARES
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry.pose import Array
 
@@ -29,6 +30,8 @@ _HALVINGS = 5
 """Halvings of the step to the first length that parts the bodies: then it is known to 1 % of the extent."""
 _EXACT = 1e-9
 """Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
+LONG = 3.0
+"""Ratio of a way out to the interference from which on that is measured exactly too."""
 _CLOSE = 1.05
 """Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
@@ -90,9 +93,16 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     depth = max(interference[0], attested)
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, depth)
+    if length > LONG * depth and a.exact is not None and b.exact is not None:
+        from clamp3d.engine.exact import exact_overlap
+
+        # A pin's way out of a hole says nothing of how much it is too thick.
+        by_points = exact_overlap(a, b, T, SHARES[0])
+        depth, interference = max(depth, -by_points.upper), (depth, min(interference[1], -by_points.lower))
+        upper = min(upper, -depth)
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
-    lower = min(-length, upper)
-    return replace(distance, lower=lower, upper=upper, normal=direction, level="depth", interference=interference)
+    distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
+    return distance.labelled("depth", f"{distance.method}; way out by meshes (FCL)")
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+
+import numpy as np
 
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import PartName
@@ -12,7 +14,7 @@ from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.status import Seat, seats
 from clamp3d.geometry.pose import SectionPose
-from clamp3d.output.section import edge_openings
+from clamp3d.output.section import Poses, edge_openings
 
 TIGHTENING_STAGES = 4
 _PARALLEL = math.radians(0.005)  # the angle that prints as 0.00 deg
@@ -98,13 +100,7 @@ def tightening_rows(assembly: Assembly) -> tuple[TighteningRow, ...]:
     """The nut's own step: in equal stages where it is one straight way, else where that changes."""
     before, last = _last_step(assembly)
     after = last[0].poses
-    stages = [
-        {
-            name: SectionPose(p.x + f * (after[name].x - p.x), p.y + f * (after[name].y - p.y), after[name].angle)
-            for name, p in before.items()
-        }
-        for f in (stage / TIGHTENING_STAGES for stage in range(TIGHTENING_STAGES + 1))
-    ]
+    stages = [between(before, after, float(f)) for f in np.linspace(0.0, 1.0, TIGHTENING_STAGES + 1)]
     rows = []
     for poses in stages if len(last) == 1 else [before, *(waypoint.poses for waypoint in last)]:
         way = _screwed(poses) - _screwed(before)
@@ -112,6 +108,16 @@ def tightening_rows(assembly: Assembly) -> tuple[TighteningRow, ...]:
         gap = 0.0 if abs(saddle.gap) <= CONTACT else saddle.gap
         rows.append(TighteningRow(way / assembly.clamp.bolt.pitch, way, gap))
     return tuple(rows)
+
+
+def between(start: Poses, end: Poses, f: float) -> dict[PartName, SectionPose]:
+    """Parts at a fraction of the way from one waypoint to the next, straight and even."""
+
+    def mix(a: SectionPose, b: SectionPose) -> SectionPose:
+        ends = zip(astuple(a), astuple(b), strict=True)
+        return SectionPose(*((1.0 - f) * x + f * y for x, y in ends))
+
+    return {name: mix(start[name], end[name]) for name in end}
 
 
 def _last_step(assembly: Assembly) -> tuple[dict[PartName, SectionPose], list[Waypoint]]:

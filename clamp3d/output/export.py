@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,6 @@ from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import check_mesh_error
 from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files
@@ -125,19 +125,66 @@ def export(
     result = source if isinstance(source, CheckResult) else None
     if not isinstance(source, Clamp):
         source = opened(source if result is None else result.scene)
-    target = _target(source, path, format, layout, unit, check_mesh_error(mesh_error))
-    shown, settings = _at_state(source, state)
+    mesh_error = check_mesh_error(mesh_error)
+    file, settings = _settings(source, path, format, layout, unit, mesh_error)
+    shown, state_settings = _at_state(source, state)
     placed = tuple(_coloured(place(shown, names), result))
     if result is not None:
-        placed += tuple(shared_bodies(result, placed, None if target.format == "step" else target.mesh_error))
-    meshed = [] if target.format == "step" else posed(placed, target.mesh_error)
-    files = _files(target, source.clamp.name if isinstance(source, Assembly) else source.name, placed, meshed)
-    contents = {key: data for key, (data, _) in files.items()}
-    listing = f"{target.file.name}.manifest.json" if target.file else f"manifest-{target.format}.json"
+        placed += tuple(shared_bodies(result, placed, settings["mesh_error_mm"]))
+    meshed = [] if settings["format"] == "step" else posed(placed, mesh_error)
     clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
-    contents[listing] = manifest(placed, meshed, files, target.settings() | settings, clamp)
-    *paths, listed = write_files(target.file.parent if target.file else Path(path), contents)
+    files = _files(settings, file, source.name if clamp is None else clamp.name, placed, meshed)
+    contents = {key: data for key, (data, _) in files.items()}
+    listing = f"{file.name}.manifest.json" if file else f"manifest-{settings['format']}.json"
+    contents[listing] = manifest(placed, meshed, files, settings | state_settings, clamp)
+    *paths, listed = write_files(file.parent if file else Path(path), contents)
     return Export(tuple(paths), listed)
+
+
+def _settings(
+    source: Clamp | Scene | Assembly,
+    path: str | Path,
+    format: str | None,
+    layout: Layout | None,
+    unit: str | None,
+    mesh_error: float,
+) -> tuple[Path | None, dict[str, Any]]:
+    """The file (None: into a folder) and the choices of an export with their defaults, as the manifest says them first.
+
+    Raises InputError for those that do not go together.
+    """
+    chosen, file = destination(path, format)
+    if layout is None:
+        layout = "assembly" if file else default_layout(chosen)
+    checks.choice("layout", layout, LAYOUTS)
+    if unit is None:
+        unit = "m" if chosen == "glb" else "mm"
+    checks.choice("unit", unit, UNITS_MM)
+    if chosen == "glb" and unit != "m":
+        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
+    if file is not None and layout == "parts":
+        raise InputError(f"layout parts needs a folder, got the file {file}")
+    if layout == "assembly" and isinstance(source, Clamp):
+        raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
+    error = None if chosen == "step" else mesh_error
+    up = "Y" if chosen == "glb" else "Z"
+    return file, {"format": chosen, "layout": layout, "unit": unit, "up": up, "mesh_error_mm": error}
+
+
+def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clamp | Scene, dict[str, Any]]:
+    """What is written, an assembly at a state of its way, and what the manifest says of that."""
+    if not isinstance(source, Assembly):
+        if state is not None:
+            raise InputError("state goes with an assembled clamp")
+        kind = "clamp" if isinstance(source, Clamp) else "scene"
+        return source, {kind: source.name, "state": None, "status": None}
+    state = state or "final"
+    scene = source.scene_at(find_state(source, state))
+    # The last bits of an optimum differ between machines: equal clamps are equal files, to 1e-9 mm and 1e-12 rad.
+    digits = np.full((4, 4), 12)
+    digits[:3, 3] = 9
+    poses = {part.name: np.vectorize(round)(part.T_world, digits) + 0.0 for part in scene.parts}
+    return scene.moved(poses), {"clamp": source.clamp.name, "state": state, "status": source.status}
 
 
 def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Iterator[PlacedPart]:
@@ -158,114 +205,43 @@ def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Itera
             yield replace(item, colour=component.colour or colours.setdefault(id(item.shape), item.colour))
 
 
-def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clamp | Scene, dict[str, Any]]:
-    """What is written, an assembly at a state of its way, and what the manifest says of that."""
-    if not isinstance(source, Assembly):
-        if state is not None:
-            raise InputError("state goes with an assembled clamp")
-        kind = "clamp" if isinstance(source, Clamp) else "scene"
-        return source, {kind: source.name, "state": None, "status": None}
-    state = state or "final"
-    scene = source.scene_at(find_state(source, state))
-    scene = replace(scene, parts=tuple(replace(part, T_world=_rounded(part.T_world)) for part in scene.parts))
-    return scene, {"clamp": source.clamp.name, "state": state, "status": source.status}
-
-
-@dataclass(frozen=True, slots=True)
-class _Target:
-    """How an export is written; ``file`` None: into a folder."""
-
-    format: Format
-    file: Path | None
-    layout: Layout
-    unit: str
-    mesh_error: float
-
-    def settings(self) -> dict[str, Any]:
-        """What the manifest says of it first."""
-        return {
-            "format": self.format,
-            "layout": self.layout,
-            "unit": self.unit,
-            "up": "Y" if self.format == "glb" else "Z",
-            "mesh_error_mm": None if self.format == "step" else self.mesh_error,
-        }
-
-
-def _target(
-    source: Clamp | Scene | Assembly,
-    path: str | Path,
-    format: str | None,
-    layout: Layout | None,
-    unit: str | None,
-    mesh_error: float,
-) -> _Target:
-    """The choices of an export with their defaults. Raises InputError for those that do not go together."""
-    chosen, file = destination(path, format)
-    if layout is None:
-        layout = "assembly" if file else default_layout(chosen)
-    checks.choice("layout", layout, LAYOUTS)
-    if unit is None:
-        unit = "m" if chosen == "glb" else "mm"
-    checks.choice("unit", unit, UNITS_MM)
-    if chosen == "glb" and unit != "m":
-        raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
-    if file is not None and layout == "parts":
-        raise InputError(f"layout parts needs a folder, got the file {file}")
-    if layout == "assembly" and isinstance(source, Clamp):
-        raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
-    return _Target(chosen, file, layout, unit, mesh_error)
-
-
 def _files(
-    target: _Target, name: str, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh]
+    settings: dict[str, Any], file: Path | None, name: str, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh]
 ) -> dict[str, tuple[bytes, Sequence[str]]]:
     """Contents of each file by its name, and the parts in it."""
     title = "".join(c if c.isprintable() else " " for c in name)
     files: dict[str, tuple[bytes, Sequence[str]]] = {}
-    if target.layout == "assembly":
-        stem = target.file.stem if target.file else file_stem(name)
-        for key, data in _render(target, placed, meshed, stem, title).items():
-            files[key if target.file is None or files else target.file.name] = data, [item.name for item in placed]
+    if settings["layout"] == "assembly":
+        stem = file.stem if file else file_stem(name)
+        for key, data in _render(settings, placed, meshed, stem, title).items():
+            files[key if file is None or files else file.name] = data, [item.name for item in placed]
         return files
     for i, (item, stem) in enumerate(zip(placed, _stems(placed), strict=True)):
-        one = _render(target, [item], meshed[i : i + 1], stem, f"{title} {item.label}")
+        one = _render(settings, [item], meshed[i : i + 1], stem, f"{title} {item.label}")
         files |= {key: (data, [item.name]) for key, data in one.items()}
     return files
 
 
-def _rounded(T: Array) -> Array:
-    """The last bits of an optimum differ between machines: equal clamps are equal files, to 1e-9 mm and 1e-12 rad."""
-    T = np.array(T)
-    T[:3, :3], T[:3, 3] = np.round(T[:3, :3], 12), np.round(T[:3, 3], 9)
-    return T + 0.0
-
-
-def _stems(placed: Sequence[PlacedPart]) -> list[str]:
+def _stems(placed: Sequence[PlacedPart]) -> Iterator[str]:
     """File names of the parts, with a number where two would be the same."""
-    out: list[str] = []
+    taken: set[str] = set()
     for item in placed:
-        stem = name = file_stem(item.label)
-        count = 1
-        while name.lower() in (other.lower() for other in out):
-            count += 1
-            name = f"{stem}-{count}"
-        out.append(name)
-    return out
+        stem = file_stem(item.label)
+        numbered = (stem if k == 1 else f"{stem}-{k}" for k in itertools.count(1))
+        name = next(name for name in numbered if name.lower() not in taken)
+        taken.add(name.lower())
+        yield name
 
 
 def _render(
-    target: _Target, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh], base: str, title: str
+    settings: dict[str, Any], placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh], stem: str, title: str
 ) -> dict[str, bytes]:
     """Contents of one exported file by its name (OBJ has two)."""
-    if target.format == "obj":
-        model, materials = mesh_formats.obj(meshed, title, target.unit, f"{base}.mtl")
-        return {f"{base}.obj": model, f"{base}.mtl": materials}
-    content = {
-        "stl": lambda: mesh_formats.stl(meshed, title, target.unit),
-        "ply": lambda: mesh_formats.ply(meshed, title, target.unit),
-        "glb": lambda: mesh_formats.glb(meshed, title, target.mesh_error),
-        "3mf": lambda: mesh_formats.three_mf(meshed, title, target.unit, target.mesh_error),
-        "step": lambda: step(placed, title, target.unit),
-    }[target.format]()
-    return {f"{base}.{target.format}": content}
+    format, unit = settings["format"], settings["unit"]
+    if format == "step":
+        return {f"{stem}.step": step(placed, title, unit)}
+    if format == "obj":
+        model, materials = mesh_formats.obj(meshed, title, unit, f"{stem}.mtl")
+        return {f"{stem}.obj": model, f"{stem}.mtl": materials}
+    write = {"stl": mesh_formats.stl, "ply": mesh_formats.ply, "glb": mesh_formats.glb, "3mf": mesh_formats.three_mf}
+    return {f"{stem}.{format}": write[format](meshed, title, unit, settings["mesh_error_mm"])}

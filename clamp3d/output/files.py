@@ -59,11 +59,9 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to be called before long work."""
-    if path == STDOUT:
-        return
     if path.is_dir():
         raise InputError(f"cannot write {short(path)}: it is a folder")
-    if not path.exists() or path.is_file():
+    if path != STDOUT and (not path.exists() or path.is_file()):
         _probe(Path(os.path.realpath(path)).parent, f"cannot write {short(path)}")
 
 

@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,7 @@ class Group:
         }
 
 
+@lru_cache(maxsize=1)
 def grouped(result: CheckResult) -> tuple[Group, ...]:
     """The findings of a check by their causes: the worst verdicts first, and of one verdict what is rarest.
 

@@ -80,7 +80,7 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
         bounds = shape.bounds_at(item.T)
     bounds = bounds / UNITS_MM[settings["unit"]]
     if settings["up"] == "Y":  # axes X, Z, -Y
-        bounds = np.array([bounds[0], bounds[1]])[[[0, 0, 1], [1, 1, 0]], [0, 2, 1]] * [1.0, 1.0, -1.0]
+        bounds = np.sort(bounds[:, [0, 2, 1]] * [1.0, 1.0, -1.0], axis=0)
     entry["bounds"] = (np.round(bounds, 9) + 0.0).tolist()
     if drawn and drawn.not_modelled:
         entry["not_modelled"] = drawn.not_modelled

@@ -28,7 +28,7 @@ _Z_UP_TO_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0,
 _DIGITS = {"mm": 9, "cm": 10, "m": 12, "in": 10}  # decimals in text: 1e-9 mm hides the last bit of sin and cos
 
 
-def stl(items: Sequence[PosedMesh], title: str, unit: str) -> bytes:
+def stl(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
     """Binary STL; the 80 byte header names what it is, its unit and the axis that is up.
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
@@ -42,7 +42,7 @@ def stl(items: Sequence[PosedMesh], title: str, unit: str) -> bytes:
     return header + bytes(export_stl(mesh))[80:]
 
 
-def ply(items: Sequence[PosedMesh], title: str, unit: str) -> bytes:
+def ply(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
     """Binary PLY with a colour per vertex, and name, unit and axes as comments.
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
@@ -79,7 +79,7 @@ def obj(items: Sequence[PosedMesh], title: str, unit: str, mtl_name: str) -> tup
     return text.encode("utf-8"), materials[mtl_name]
 
 
-def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
+def glb(items: Sequence[PosedMesh], title: str, unit: str, mesh_error: float) -> bytes:
     """Binary glTF 2.0: metres and Y up (the root node turns Z up to it), local coordinates, named nodes, materials.
 
     Parts from a file stand in its tree of assemblies. Parts of one shape and colour share a mesh.
@@ -100,7 +100,7 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
             nodes[assembly] = add(assembly.instance, assembly.T, assembly.assembly), assembly.T
         parent, T_parent = nodes[assembly]
         T = inverse(T_parent) @ T
-        T[:3, 3] /= UNITS_MM["m"]
+        T[:3, 3] /= UNITS_MM[unit]
         names[key := f"node {len(names)}"] = name
         scene.graph.update(frame_to=key, frame_from=parent, matrix=T, geometry=geometry)  # type: ignore[no-untyped-call]
         return key
@@ -108,13 +108,17 @@ def glb(items: Sequence[PosedMesh], title: str, mesh_error: float) -> bytes:
     for item in items:
         geometry = meshes.setdefault((id(item.mesh), item.colour), f"mesh {len(meshes)}")
         if geometry not in scene.geometry:
-            local = trimesh.Trimesh(item.mesh.vertices / UNITS_MM["m"] + 0.0, item.mesh.faces, process=False)
+            local = trimesh.Trimesh(item.mesh.vertices / UNITS_MM[unit] + 0.0, item.mesh.faces, process=False)
             scene.geometry[geometry] = local
             shown.append(item)
         add(item.label, item.T, item.component.assembly if item.component else None, geometry)
 
     def finish(tree: dict[str, Any]) -> None:
-        tree["asset"] = {"version": "2.0", "generator": "clamp3d", "extras": {"unit": "m", "mesh_error_mm": mesh_error}}
+        tree["asset"] = {
+            "version": "2.0",
+            "generator": "clamp3d",
+            "extras": {"unit": unit, "mesh_error_mm": mesh_error},
+        }
         tree["materials"] = [_material(item) for item in shown]
         for i, (entry, item) in enumerate(zip(tree["meshes"], shown, strict=True)):
             entry["name"] = item.component.name if item.component else item.label

@@ -77,6 +77,23 @@ def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
     return [PosedMesh(meshes[part.shape], part.T, part.colour, part.label, part.component) for part in parts]
 
 
+def overlap(a: PosedMesh, b: PosedMesh) -> trimesh.Trimesh | None:
+    """What two parts share, in the world, by manifold3d; None where their facets do not meet."""
+    import manifold3d
+    import trimesh
+
+    # Not by trimesh, whose booleans round to single precision.
+    first, second = (
+        manifold3d.Manifold(manifold3d.Mesh64(item.world, np.array(item.mesh.faces, np.uint64, order="C")))
+        for item in (a, b)
+    )
+    shared = (first ^ second).to_mesh64()
+    if not len(shared.tri_verts):
+        return None
+    vertices, faces = np.asarray(shared.vert_properties)[:, :3], np.asarray(shared.tri_verts, np.int64)
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
 def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
     import trimesh
 

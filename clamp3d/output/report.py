@@ -6,7 +6,7 @@ The findings are gathered here, all distances and verdicts from the engine; `rep
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +15,6 @@ from clamp3d.checks import function, instance
 from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.result import Assembly
-from clamp3d.engine.answer import Distance
 from clamp3d.engine.check import check
 from clamp3d.engine.result import BAD, PairResult
 from clamp3d.engine.scene import Scene
@@ -42,28 +41,22 @@ SEVERITIES: dict[Severity, str] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PairRow:
+class PairRow(PairResult):
     """A pair as a reviewer reads of it: the engine's row, what it amounts to, and what a clamp knows beyond it."""
 
-    result: PairResult
-    severity: Severity
+    severity: Severity = "ok"
     remark: str = ""
     contact: Contact | None = None
+
+    @classmethod
+    def of(cls, row: PairResult) -> PairRow:
+        """A row of the engine."""
+        return cls(**{key.name: getattr(row, key.name) for key in fields(row)}, severity=_severity(row.verdict))
 
     @property
     def name(self) -> str:
         """Short name of the pair."""
-        return f"{self.result.a}-{self.result.b}"
-
-    @property
-    def verdict(self) -> str:
-        """The verdict's name."""
-        return self.result.verdict.value
-
-    @property
-    def distance(self) -> Distance:
-        """The signed distance between its bounds."""
-        return self.result.distance
+        return f"{self.a}-{self.b}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,35 +208,26 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
     on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
     result = check(scene, progress=on_stage)
     names = titles(scene)
-    rows = {id(pair): PairRow(pair, _severity(pair.verdict)) for pair in result.rows}
-    findings = []
-    for group in grouped(result):
-        worst = rows[id(group.worst)]
-        findings.append(Finding(worst.severity, group_text(group, names), worst, group))
-    return Report(
-        scene=scene,
-        headline=headline(result),
-        passed=result.clean,
-        findings=tuple(findings),
-        rows=tuple(rows[id(pair)] for pair in result.pairs),
-        motions=tuple(rows[id(pair)] for pair in result.motions),
-        n_pairs=result.work.pairs,
-    )
+    rows = {id(row): PairRow.of(row) for row in result.rows}
+    shown = [(group, rows[id(group.worst)]) for group in grouped(result)]
+    findings = tuple(Finding(row.severity, group_text(group, names), row, group) for group, row in shown)
+    at_rest, moving = (tuple(rows[id(row)] for row in own) for own in (result.pairs, result.motions))
+    return Report(scene, headline(result), result.clean, findings, at_rest, moving, result.work.pairs)
 
 
 def _of_assembly(assembly: Assembly, scene: Scene) -> Report:
     different = {(d.a, d.b) for d in assembly.matrix_differences if not d.measured}
     rows = tuple(_contact_row(scene, contact, (contact.a, contact.b) in different) for contact in assembly.contacts)
     findings = [
-        Finding(f.severity, f.text, next((r for r in rows if (r.result.a, r.result.b) == (f.a, f.b)), None))
+        Finding(f.severity, f.text, next((r for r in rows if (r.a, r.b) == (f.a, f.b)), None))
         for f in assembly.findings
     ]
     named = {finding.row for finding in findings}
     names = titles(scene)
     for row in sorted(rows, key=lambda row: row.distance.upper):
         if row.severity != "ok" and row not in named:
-            text = f"{names[row.result.a]} and {names[row.result.b]} {row.remark}: {distance_text(row.distance)}"
-            findings.append(Finding(row.severity, text if row.remark else sentence(row.result, names), row))
+            text = f"{names[row.a]} and {names[row.b]} {row.remark}: {distance_text(row.distance)}"
+            findings.append(Finding(row.severity, text if row.remark else sentence([row], names), row))
     findings.sort(key=lambda finding: list(SEVERITIES).index(finding.severity))
     passed = assembly.clamped and not any(finding.severity == "error" for finding in findings)
     line = "Clamped: both wires are held and nothing meets that should not."
@@ -269,7 +253,7 @@ def _contact_row(scene: Scene, contact: Contact, apart: bool) -> PairRow:
         severity, remark = "warning" if contact.declared == 3 else "note", "are declared to touch, and do not"
     elif contact.declared == 3 and Thresholds(scene.contact).verdict(contact.distance) is Verdict.UNCERTAIN:
         severity, remark = "warning", "touch or not, within the error bound of the method"
-    return PairRow(PairResult(a, b, verdict, contact.distance), severity, remark, contact)
+    return PairRow(a, b, verdict, contact.distance, severity=severity, remark=remark, contact=contact)
 
 
 def _severity(verdict: Verdict) -> Severity:

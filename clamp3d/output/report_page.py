@@ -118,10 +118,10 @@ def _cells(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 def report_html(report: Report, *, progress: Callable[[str], None] = lambda step: None) -> str:
     """The report as one HTML page with its pictures inside."""
-    cells = {(row.result.a, row.result.b): row for row in report.rows}
+    cells = {(row.a, row.b): row for row in report.rows}
     names = [part.name for part in report.scene.parts]
     if len(names) > MATRIX:
-        seen = {n for row in report.rows if row.verdict != "clear" for n in (row.result.a, row.result.b)}
+        seen = {n for row in report.rows if row.verdict != "clear" for n in (row.a, row.b)}
         names = [name for name in names if name in seen][:MATRIX]
     return render(
         "report.html",
@@ -168,9 +168,9 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
                 jobs.append(("pairs", row.name, partial(contact_figure, assembly, row.contact), row))
     elif scene.parts:
         rows = [finding.row for finding in report.findings if finding.row is not None]
-        marks = [(number, row.result) for number, row in enumerate(rows, 1)]
+        marks = [(number, row) for number, row in enumerate(rows, 1)]
         jobs.append(("overview", "the scene", partial(scene_figure, scene, marks[:PICTURES]), None))
-        jobs += [("pairs", row.name, partial(finding_figure, scene, row.result), row) for row in rows[:PICTURES]]
+        jobs += [("pairs", row.name, partial(finding_figure, scene, row), row) for row in rows[:PICTURES]]
     out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
     for kind, name, draw, pair in jobs:
         progress(f"picture of {name}")
@@ -191,7 +191,7 @@ def _finding_to_dict(finding: Finding) -> dict[str, Any]:
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:
-    data = row.result.to_dict() | {
+    data = row.to_dict() | {
         "severity": row.severity,
         "lower_bound": not (math.isfinite(row.distance.lower) and math.isfinite(row.distance.upper)),
         "remark": row.remark,

@@ -13,10 +13,9 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import MIN_MESH_ERROR
 from clamp3d.geometry.shapes import Solid
-from clamp3d.output.common import overlap
 from clamp3d.output.figures import blank, numbered
 from clamp3d.output.palette import INK, VERDICT_COLOURS
-from clamp3d.output.placed import PosedMesh, place, posed
+from clamp3d.output.placed import PosedMesh, overlap, place, posed
 from clamp3d.output.view3d import Camera, draw_solids
 
 if TYPE_CHECKING:
@@ -126,10 +125,10 @@ def _place(row: PairResult) -> Array | None:
 def _common(a: PosedMesh, b: PosedMesh) -> PosedMesh | None:
     """What two overlapping parts have in common; None where their facets do not meet or cannot be cut."""
     try:
-        shared = overlap(a.mesh, a.T, b.mesh, b.T)
+        shared = overlap(a, b)
     except (Clamp3dError, RuntimeError, ValueError):
         return None
-    return None if shared is None else PosedMesh(shared, a.T, VERDICT_COLOURS["clash"])
+    return None if shared is None else PosedMesh(shared, np.eye(4), VERDICT_COLOURS["clash"])
 
 
 def _mark(ax: Axes, camera: Camera, place: Array, row: PairResult, dashes: Any = "solid") -> tuple[float, float]:

@@ -15,13 +15,13 @@ from clamp3d.output.baseline import Comparison
 from clamp3d.output.groups import Accepted, Group, grouped
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
+    by_group,
     counted,
     distance_text,
     first_text,
     group_text,
     headline,
     titles,
-    worst_first,
 )
 
 _LISTED, _PAIRS, _NOTES = 60, 30, 12
@@ -58,7 +58,7 @@ def check_to_text(
     if result.pairs:
         rows = [
             (f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance), row.distance.method)
-            for row in worst_first(result.pairs)
+            for row in by_group(result, result.pairs)
         ]
         lines += ["", text_table(("pair", "verdict", "distance", "by"), rows[:_PAIRS], indent=2)]
         if len(rows) > _PAIRS:
@@ -148,7 +148,7 @@ def _motions(result: CheckResult) -> str:
             "" if row.contact_at is None else first_text(row.contact_at),
             row.distance.method,
         )
-        for row in result.motions
+        for row in by_group(result, result.motions)
     ]
     return text_table(head, rows, indent=2)
 

@@ -1,4 +1,4 @@
-"""Where a scene goes: a page served by tornado, as meshcat's own is, or a meshcat server that is running.
+"""Where a scene goes: a page that this process serves, or a meshcat server that is running.
 
 Meshcat's server cannot do what the page needs: it has one fixed page, listens on every address of the machine, and
 answers no questions.
@@ -6,35 +6,33 @@ answers no questions.
 
 from __future__ import annotations
 
-import asyncio
+import base64
 import contextlib
 import errno
 import io
 import ipaddress
+import json
 import socket
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from http.server import BaseHTTPRequestHandler
+from socketserver import ThreadingTCPServer
 from types import SimpleNamespace
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 import umsgpack
 import zmq
-from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
-from tornado.web import Application, HTTPError, RequestHandler
-from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from clamp3d.checks import text, whole
 from clamp3d.errors import Clamp3dError, InputError
 
 PORT, PORTS = 7000, 200
 """First port tried, meshcat's own, and how many are tried; unless the user named one."""
-_TIMEOUT = 10.0  # s for an answer of a meshcat server
+_TIMEOUT = 10.0  # s for an answer of a meshcat server, and for new commands of a page
 
 Command = dict[str, Any]
-Answer = Callable[[Mapping[str, str]], dict[str, Any]]
+Answer = Callable[[Mapping[str, str]], str | dict[str, Any]]
 
 
 class CommandLog:
@@ -44,33 +42,43 @@ class CommandLog:
 
     >>> log = CommandLog()
     >>> for x in (1.0, 2.0):
-    ...     _ = log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
+    ...     log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
     >>> len(log.messages())
     1
     """
 
     def __init__(self) -> None:
-        self._messages: dict[tuple[str, str, str], bytes] = {}
+        self._messages: dict[tuple[str, str, str], tuple[int, str]] = {}
+        self._count = 0
+        self._changed = threading.Condition()
 
-    def add(self, command: Command) -> list[bytes]:
-        """Keep ``command``; the new messages (msgpack) that our page reads."""
-        new = []
-        if command["type"] == "set_object":
-            command = command | {"object": dict(command["object"])}
-            for geometry in command["object"].pop("geometries"):
-                key = ("set_geometry", geometry["uuid"], "")
-                if key not in self._messages:
-                    data = {"type": "set_geometry", "path": geometry["uuid"], "geometry": geometry}
-                    self._messages[key] = umsgpack.packb(data)
-                    new.append(self._messages[key])
-        key = (command["type"], command["path"], command.get("property", ""))
+    def add(self, command: Command) -> None:
+        """Keep ``command``."""
+        with self._changed:
+            if command["type"] == "set_object":
+                command = command | {"object": dict(command["object"])}
+                for geometry in command["object"].pop("geometries"):
+                    key = ("set_geometry", geometry["uuid"], "")
+                    if key not in self._messages:
+                        self._keep(key, {"type": "set_geometry", "path": geometry["uuid"], "geometry": geometry})
+            self._keep((command["type"], command["path"], command.get("property", "")), command)
+            self._changed.notify_all()
+
+    def _keep(self, key: tuple[str, str, str], command: Command) -> None:
         self._messages.pop(key, None)
-        self._messages[key] = umsgpack.packb(command)
-        return [*new, self._messages[key]]
+        self._count += 1
+        self._messages[key] = self._count, base64.b64encode(umsgpack.packb(command)).decode("ascii")
 
-    def messages(self) -> list[bytes]:
-        """All messages that build the scene, oldest first."""
-        return list(self._messages.values())
+    def messages(self, since: int = 0) -> list[str]:
+        """What builds the scene, or brings one of ``since`` commands up to date: msgpack in base64, oldest first."""
+        return [message for number, message in self._messages.values() if number > since]
+
+    def news(self, query: Mapping[str, str]) -> dict[str, Any]:
+        """What a page asks for that has the first ``since`` commands, as soon as there is more, or after a while."""
+        since = int(query.get("since", 0))
+        with self._changed:
+            self._changed.wait_for(lambda: self._count > since, _TIMEOUT)
+            return {"messages": self.messages(since), "count": self._count}
 
 
 class PageServer:
@@ -81,107 +89,70 @@ class PageServer:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
-        self.names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
-        self._sockets = _bind(host, port)
-        self.port: int = self._sockets[0].getsockname()[1]
+        names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
+        self._server = _bind(host, port, names)
+        self.port: int = self._server.socket.getsockname()[1]
         self.url = f"http://{host}:{self.port}/"
-        self.pages: set[WebSocketHandler] = set()
-        self.work = ThreadPoolExecutor(1, "clamp3d viewer")
-        self._loop, self._closed = asyncio.new_event_loop(), asyncio.Event()
-        self._thread: threading.Thread | None = None
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), name="clamp3d viewer")
 
-    def start(self, page: Callable[[], str], messages: Callable[[], list[bytes]], answer: Answer) -> None:
-        """Serve ``page()``, which gets ``messages()`` and all that follow, and whose questions ``answer`` answers."""
-        handlers: list[tuple[str, Any, dict[str, Any]]] = [
-            ("/", _Page, {"server": self, "page": page, "messages": messages}),
-            ("/answer", _Answer, {"server": self, "answer": answer}),
-        ]
-        serving = self._serve(Application(handlers, log_function=lambda handler: None))
-        self._thread = threading.Thread(target=self._loop.run_until_complete, args=(serving,), name="clamp3d viewer")
+    def start(self, page: Callable[[], str], log: CommandLog, answer: Answer) -> None:
+        """Serve ``page()``, which follows the commands in ``log`` and whose questions ``answer`` answers."""
+        self._server.replies = {"/": lambda query: page(), "/commands": log.news, "/answer": answer}
         self._thread.daemon = True
         self._thread.start()
 
-    async def _serve(self, application: Application) -> None:
-        server = HTTPServer(application)
-        server.add_sockets(self._sockets)
-        await self._closed.wait()
-        server.stop()
-        for page in self.pages.copy():
-            page.close()
-        await server.close_all_connections()
-
-    def send(self, messages: list[bytes]) -> None:
-        """Pass messages on to the pages that are open."""
-        if self._thread is not None:
-            self._loop.call_soon_threadsafe(self._broadcast, messages)
-
-    def _broadcast(self, messages: list[bytes]) -> None:
-        for page in self.pages.copy():
-            with contextlib.suppress(WebSocketClosedError):
-                for message in messages:
-                    page.write_message(message, binary=True)
-
     def close(self) -> None:
         """Stop listening and end the thread. A second call does nothing."""
-        if self._thread is not None:
-            self._loop.call_soon_threadsafe(self._closed.set)
+        if self._thread.is_alive():
+            self._server.shutdown()
             self._thread.join()
-            self.work.shutdown(cancel_futures=True)
-            self._thread = None
-        for own in self._sockets:
-            own.close()
+        self._server.server_close()
 
 
-class _Handler(RequestHandler):
-    """Refuses requests under a foreign name."""
+class _Server(ThreadingTCPServer):
+    """Listens at an address under ``names``; ``replies`` are what is served at each place, as text or as data."""
 
-    def prepare(self) -> None:
-        name = urlsplit(f"//{self.request.headers.get('Host', '')}").hostname or ""
-        if name not in self.own_server.names and not _is_address(name):
-            raise HTTPError(403)
+    allow_reuse_address = daemon_threads = True
 
-    def initialize(self, server: PageServer, **functions: Callable[..., Any]) -> None:
-        self.own_server = server
-        self.__dict__.update(functions)
+    def __init__(self, host: str, port: int, names: set[str]) -> None:
+        self.names, self.replies, self.questions = names, dict[str, Answer](), threading.Lock()
+        self.address_family = socket.getaddrinfo(host or "(none)", port, type=socket.SOCK_STREAM)[0][0]
+        super().__init__((host, port), _Handler)
 
-
-class _Page(_Handler, WebSocketHandler):
-    """The page, and its commands at the same address, where meshcat's viewer looks for them."""
-
-    page: Callable[[], str]
-    messages: Callable[[], list[bytes]]
-
-    async def get(self) -> None:
-        if self.request.headers.get("Upgrade", "").lower() == "websocket":
-            await super().get()
-        else:
-            self.set_header("Cache-Control", "no-store")
-            self.finish(self.page().encode("utf-8", "backslashreplace"))
-
-    def open(self) -> None:
-        for message in self.messages():
-            self.write_message(message, binary=True)
-        self.own_server.pages.add(self)
-
-    def on_message(self, message: str | bytes) -> None:
-        pass
-
-    def on_close(self) -> None:
-        self.own_server.pages.discard(self)
+    def handle_error(self, *_: object) -> None:
+        """A page that went away before it had its reply is no error."""
 
 
-class _Answer(_Handler):
-    """What a page asks while somebody looks at it, one question after the other."""
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
 
-    answer: Answer
+    def do_GET(self) -> None:
+        name = urlsplit(f"//{self.headers.get('Host', '')}").hostname or ""
+        if name not in self.server.names and not _is_address(name):
+            return self.send_error(403)
+        place = urlsplit(self.path)
+        if place.path not in self.server.replies:
+            return self.send_error(404)
+        status, content = self._reply(place.path, dict(parse_qsl(place.query)))
+        is_page = isinstance(content, str)
+        body = (content if is_page else json.dumps(content)).encode("utf-8", "backslashreplace")
+        self.send_response(status)
+        self.send_header("Content-Type", "text/html; charset=utf-8" if is_page else "application/json")
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(body)
 
-    async def get(self) -> None:
-        query = {key: self.get_argument(key) for key in self.request.arguments}
+    def _reply(self, path: str, query: dict[str, str]) -> tuple[int, Any]:
+        """Status and content; measuring takes one question after the other."""
         try:
-            self.write(await asyncio.get_running_loop().run_in_executor(self.own_server.work, self.answer, query))
+            with self.server.questions if path == "/answer" else contextlib.nullcontext():
+                return 200, self.server.replies[path](query)
         except Exception as error:  # a question that fails is not the end of the page
-            self.set_status(400 if isinstance(error, Clamp3dError) else 500)
-            self.write({"error": str(error)})
+            return 400 if isinstance(error, (Clamp3dError, ValueError)) else 500, {"error": str(error)}
+
+    def log_message(self, *_: object) -> None:
+        pass
 
 
 def _is_address(name: str) -> bool:
@@ -190,13 +161,13 @@ def _is_address(name: str) -> bool:
     return False
 
 
-def _bind(host: str, port: int | None) -> list[socket.socket]:
-    """Sockets on ``port``, or on the first free one. Raises InputError if there is none."""
+def _bind(host: str, port: int | None, names: set[str]) -> _Server:
+    """A server on ``port``, or on the first free one. Raises InputError if there is none."""
     if port is not None:
         whole("port", port, least=0, most=65535)
     for candidate in range(PORT, PORT + PORTS) if port is None else (port,):
         try:
-            return bind_sockets(candidate, host or "(none)")
+            return _Server(host, candidate, names)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             if getattr(error, "errno", None) != errno.EADDRINUSE:

@@ -12,9 +12,8 @@ from clamp3d.files.open_cascade import bounds_of, moved, to_bytes, volume_of
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.shapes import MeshShape
-from clamp3d.output.common import overlap
 from clamp3d.output.palette import VERDICT_COLOURS
-from clamp3d.output.placed import PlacedPart, posed
+from clamp3d.output.placed import PlacedPart, overlap, posed
 from clamp3d.output.step import exact_solid
 
 
@@ -44,9 +43,5 @@ def _exact(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
 
 
 def _faceted(name: str, a: PlacedPart, b: PlacedPart, mesh_error: float) -> MeshShape | None:
-    first, second = posed([a, b], mesh_error)
-    common = overlap(first.mesh, first.T, second.mesh, second.T)
-    if common is None:
-        return None
-    common.apply_transform(first.T)
-    return MeshShape(make_mesh(common.vertices, common.faces), name=name)
+    common = overlap(*posed([a, b], mesh_error))
+    return None if common is None else MeshShape(make_mesh(common.vertices, common.faces), name=name)

@@ -8,11 +8,10 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -31,12 +30,10 @@ from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import Command, Pieces, SceneDrawing
-from clamp3d.output.viewer_story import LISTED, ClampStory, SceneStory, Stop, findings_of, focus
-from clamp3d.output.wording import counted, distance_text, headline, meaning, severity, titles, worst_first
+from clamp3d.output.viewer_story import LISTED, ClampStory, Stop, Story, findings_of, findings_of_clamp
+from clamp3d.output.wording import by_group, counted, distance_text, headline, meaning, severity, titles
 from clamp3d.scenefile.check import opened
 
-_SEVERITY = {"error": "clash", "warning": "contact"}
-"""The verdict whose colour a finding of an assembly has."""
 _CURVES = 4
 """Findings in motions whose distance curves a saved page holds; a served page asks for any."""
 _UNCUT = ("P4", "P5")
@@ -73,21 +70,20 @@ class Viewer(AbstractContextManager["Viewer"]):
         mesh_error: float = 0.01,
         overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
-        self._source = shown if isinstance(shown, ClampStory) else SceneStory(shown)
+        self._source = shown if isinstance(shown, ClampStory) else Story(shown)
         self._server, self._log = server, CommandLog()
         self._mesh_error, self._overlays = mesh_error, list(overlays or {})
         self._rows: dict[tuple[str, str], PairResult] = {}
         self._looked = -math.inf
         self._panel = ""
-        anchors = self._source.anchors
         self._drawing = SceneDrawing(
-            self._source.scene, self._send, mesh_error=mesh_error, anchors=anchors, overlays=overlays
+            self._source.scene, self._send, mesh_error=mesh_error, anchors=self._source.anchors, overlays=overlays
         )
         self.story: dict[str, Any] = {}
         """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
-        self._tell("waiting for the first state" if isinstance(shown, ClampStory) else "checking ...", "waiting")
+        self._tell(self._source.waiting, "waiting")
         if isinstance(server, PageServer):
-            server.start(lambda: self._page([]), self._log.messages, self.answer)
+            server.start(lambda: self._page([]), self._log, self.answer)
 
     @property
     def url(self) -> str | None:
@@ -108,16 +104,34 @@ class Viewer(AbstractContextManager["Viewer"]):
         if time.monotonic() > self._looked + _PAUSE and any(row.verdict in BAD for row in self._rows.values()):
             work = Work(0, 0, len(self._rows), 0, 0, 0, 0, 0, {}, {}, {})
             so_far = CheckResult(self._source.scene, tuple(self._rows.values()), (), None, work)
-            findings = [self._with_margin(f) for f in findings_of(so_far, self._drawing.timeline, brief=True)]
-            self._tell(f"So far: {headline(so_far)}; the check is running", "running", findings=findings[:LISTED])
+            findings = findings_of(so_far, self._drawing.timeline, brief=True)
+            self._tell(f"So far: {headline(so_far)}; the check is running", "running", findings)
             self._looked = time.monotonic()
 
     def finish(self, result: Assembly | CheckResult) -> None:
         """Show the result, and play the whole time line once."""
         instance("result", result, Assembly, CheckResult)
-        shown = self._assembly(result) if isinstance(result, Assembly) else self._check(result)
-        self._drawing.play(self._accuracy)
-        self._tell(**shown, done=True)
+        drawing = self._drawing
+        if isinstance(result, Assembly):
+            for waypoint in result.path[len(drawing.timeline.stops) :]:
+                self.show(waypoint)
+            forces = [force for force in result.forces if force.feature != HELD]
+            drawing.forces(forces)
+            drawing.play(self._accuracy)
+            worst = {finding.severity for finding in result.findings}
+            state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
+            notes = [finding.text for finding in result.findings if finding.severity == "note"]
+            findings = findings_of_clamp(result, drawing.timeline, drawing.extent(drawing.timeline.stops[-1].poses))
+            self._tell(result.status, state, findings, done=True, assembly=result, forces=forces, notes=notes)
+        else:
+            for stop in self._source.stops(result):
+                drawing.show(stop)
+            drawing.play(self._accuracy)
+            pairs, motions = (by_group(result, rows)[:LISTED] for rows in (result.pairs, result.motions))
+            notes = [*result.scene.notes, *work_text(result.work)]
+            findings = findings_of(result, drawing.timeline)
+            words = {"pairs": pairs, "motions": motions, "notes": notes}
+            self._tell(headline(result), severity(result), findings, done=True, **words)
 
     def answer(self, query: Mapping[str, str]) -> dict[str, Any]:
         """How pairs stand at a moment of the time line, as the page asks: ``time`` in s; the pair ``a``, ``b``, or all.
@@ -136,26 +150,17 @@ class Viewer(AbstractContextManager["Viewer"]):
 
     def html(self) -> str:
         """The scene with its animation as one HTML page that needs neither server nor network."""
-        curves: dict[int, list[dict[str, Any]]] = {}
-        for k, finding in enumerate(self.story["findings"]):
-            if finding["moments"] and len(curves) < _CURVES:
-                pair = {"a": finding["a"], "b": finding["b"]}
-                curves[k] = [self.answer(pair | {"time": str(s)})["rows"][0] for s in finding["moments"]]
-        self.story["curves"] = {
-            str(k): [[row["at_least_mm"], row["at_most_mm"]] for row in rows] for k, rows in curves.items()
-        }
+        moving = [(k, finding) for k, finding in enumerate(self.story["findings"]) if finding["moments"]]
+        for k, finding in moving[:_CURVES]:
+            pair = {"a": finding["a"], "b": finding["b"]}
+            rows = [self.answer(pair | {"time": str(s)})["rows"][0] for s in finding["moments"]]
+            self.story["curves"][str(k)] = [[row["at_least_mm"], row["at_most_mm"]] for row in rows]
         self._send_story()
         return self._page(self._log.messages())
 
-    def _page(self, messages: list[bytes]) -> str:
-        return render(
-            "viewer.html",
-            title=self.story["title"],
-            panel=self._panel,
-            done=self.story["done"],
-            messages=[base64.b64encode(message).decode("ascii") for message in messages],
-            **_meshcat_script(),
-        )
+    def _page(self, messages: list[str]) -> str:
+        title, done = self.story["title"], self.story["done"]
+        return render("viewer.html", title=title, panel=self._panel, done=done, messages=messages, **_meshcat_script())
 
     def save_html(self, path: str | Path) -> None:
         """Write `html` to a file. Raises InputError if it cannot be written."""
@@ -170,61 +175,12 @@ class Viewer(AbstractContextManager["Viewer"]):
         self.close()
 
     def _send(self, command: Command) -> None:
-        messages = self._log.add(command)
-        if isinstance(self._server, PageServer):
-            self._server.send(messages)
-        elif self._server is not None and command["type"] != "set_story":
+        self._log.add(command)
+        if isinstance(self._server, MeshcatServer) and command["type"] != "set_story":
             self._server.send(command)
 
     def _send_story(self) -> None:
         self._send({"type": "set_story", "path": "", "value": self.story | {"panel": self._panel}})
-
-    def _assembly(self, run: Assembly) -> dict[str, Any]:
-        """What the page says of an assembly."""
-        for waypoint in run.path[len(self._drawing.timeline.stops) :]:
-            self.show(waypoint)
-        forces = [force for force in run.forces if force.feature != HELD]
-        self._drawing.forces(forces)
-        worst = {finding.severity for finding in run.findings}
-        number, stop = len(run.path) - 1, self._drawing.timeline.stops[-1]
-        findings = []
-        for k, finding in enumerate(f for f in run.findings if f.severity != "note"):
-            # The place to look at is where the pair that it names is at the end, else the whole clamp.
-            row = next((row for row in stop.rows if (row.a, row.b) == (finding.a, finding.b)), None)
-            low, high = self._drawing.extent(stop.poses) if row is None else focus(row.distance)
-            words = {"title": finding.text, "text": finding.text, "detail": "", "group": str(k), "moments": []}
-            pair = {"a": finding.a or "", "b": finding.b or "", "verdict": _SEVERITY[finding.severity]}
-            findings.append(self._with_margin(pair | words | {"stop": number, "low": low, "high": high}))
-        return {
-            "text": run.status,
-            "state": "found" if "error" in worst else "note" if "warning" in worst else "clean",
-            "assembly": run,
-            "forces": forces,
-            "findings": findings,
-            "notes": [finding.text for finding in run.findings if finding.severity == "note"],
-        }
-
-    def _check(self, result: CheckResult) -> dict[str, Any]:
-        """What the page says of a checked scene."""
-        assert isinstance(self._source, SceneStory)
-        for stop in self._source.stops(result):
-            self._drawing.show(stop)
-        findings = itertools.islice(findings_of(result, self._drawing.timeline), LISTED)
-        return {
-            "text": headline(result),
-            "state": severity(result),
-            "findings": [self._with_margin(finding) for finding in findings],
-            "pairs": worst_first(result.pairs)[:LISTED],
-            "motions": worst_first(result.motions)[:LISTED],
-            "notes": [*result.scene.notes, *work_text(result.work)],
-        }
-
-    def _with_margin(self, finding: dict[str, Any]) -> dict[str, Any]:
-        """A finding with some room around its place: the common part, else the nearest points."""
-        place = (finding["stop"], finding["a"], finding["b"])
-        low, high = self._drawing.shared.get(place, (finding["low"], finding["high"]))
-        margin = 0.1 * self._drawing.size
-        return finding | {"low": (low - margin).tolist(), "high": (high + margin).tolist()}
 
     @property
     def _accuracy(self) -> str:
@@ -232,8 +188,10 @@ class Viewer(AbstractContextManager["Viewer"]):
         facets = f"Drawn with facets within {self._mesh_error:g} mm, those of files as they are."
         return f"{facets} {self._source.accuracy}"
 
-    def _tell(self, text: str, state: str, *, done: bool = False, **more: Any) -> None:
-        """Set what the page beside the picture shows."""
+    def _tell(
+        self, text: str, state: str, findings: Iterable[dict[str, Any]] = (), *, done: bool = False, **more: Any
+    ) -> None:
+        """Set what the page beside the picture shows; ``more`` is for its panel only."""
         source, drawing = self._source, self._drawing
         stops = [_stop_data(stop, drawing) for stop in drawing.timeline.stops]
         self.story = {
@@ -241,7 +199,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             "headline": text,
             "done": done,
             "stops": stops,
-            "findings": more.get("findings", []),
+            "findings": [drawing.with_margin(finding) for finding in itertools.islice(findings, LISTED)],
             "curves": {},
             "forces": [force.to_dict() for force in more.get("forces", ())],
             "paths": drawing.paths,
@@ -253,6 +211,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         numbered = enumerate(self.story["findings"])
         used = {row["verdict"] for stop in stops for row in stop["rows"]}
         context = {
+            **{"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()},
             "source": source,
             "drawing": drawing,
             "state": state,
@@ -267,8 +226,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             "counted": counted,
             "degrees": math.degrees,
         }
-        missing = {"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()}
-        self._panel = render("viewer.panel.html", **(self.story | missing | context | more))
+        self._panel = render("viewer.panel.html", **(self.story | context | more))
         self._send_story()
 
 

@@ -80,9 +80,7 @@ def facets(mesh: trimesh.Trimesh, colour: str, *, opacity: float = 1.0, on_top: 
 
 def box(low: Array, high: Array, colour: str) -> g.Object:
     """The twelve edges of a box from corner to corner, drawn over the solids."""
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    pairs = [(i, j) for i in range(8) for j in range(i) if np.abs(corners[i] - corners[j]).sum() == 1]
-    return lines(points(low + corners[np.array(pairs).ravel()] * (high - low)), colour, on_top=True)
+    return lines(sharp_edges(trimesh.creation.box(bounds=[low, high])), colour, on_top=True)
 
 
 def dot(radius: float, colour: str) -> g.Object:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,8 @@ from clamp3d.engine.result import BAD
 from clamp3d.engine.scene import Scene
 from clamp3d.geometry.pose import Array
 from clamp3d.output import viewer_objects as draw
-from clamp3d.output.common import overlap
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
-from clamp3d.output.placed import PosedMesh, place, posed
+from clamp3d.output.placed import PosedMesh, overlap, place, posed
 from clamp3d.output.viewer_story import Poses, Row, Stop, Timeline, focus
 
 Command = dict[str, Any]
@@ -77,7 +77,7 @@ class SceneDrawing:
         self.size = float((high - low).max())
         self._unit = _SIZE / self.size
         self.timeline = Timeline(self.size)
-        self.shared: dict[tuple[int, str, str], tuple[Array, Array]] = {}
+        self._shared: dict[tuple[int, str, str], tuple[Array, Array]] = {}
         """Corners of the box around what a pair shares at a stop."""
         self._stage()
         for name, solid in self._meshes.items():
@@ -104,8 +104,6 @@ class SceneDrawing:
     def show(self, stop: Stop) -> None:
         """Add a stop to the time line and go there."""
         number = self.timeline.add(stop)
-        if number == 0:
-            self.frame(*self.extent(stop.poses))
         group = self.timeline.group(number)
         marked = [row for row in stop.rows if row.near][:_MARKED]
         for row in marked:
@@ -154,6 +152,13 @@ class SceneDrawing:
         low, high = self._all_stops()
         return {"low": low.tolist(), "high": high.tolist(), "eye": self._eye.tolist()}
 
+    def with_margin(self, finding: dict[str, Any]) -> dict[str, Any]:
+        """A finding of the page with some room around its place: the common part, else the nearest points."""
+        place = (finding["stop"], finding["a"], finding["b"])
+        low, high = self._shared.get(place, (finding["low"], finding["high"]))
+        margin = 0.1 * self.size
+        return finding | {"low": (low - margin).tolist(), "high": (high + margin).tolist()}
+
     def _stage(self) -> None:
         """Light background, softer light, no grid."""
         self._send({"type": "delete", "path": ROOT})
@@ -201,12 +206,11 @@ class SceneDrawing:
         for name, point in (("point a", row.distance.point_a), ("point b", row.distance.point_b)):
             if point is not None:
                 self._dot(f"{path}/{name}", point, red)
-        common = overlap(self._meshes[a].mesh, poses[a], self._meshes[b].mesh, poses[b])
+        common = overlap(*(replace(self._meshes[name], T=poses[name]) for name in (a, b)))
         low, high = focus(row.distance)
         if common is not None:
-            common.apply_transform(poses[a])
             self._put(f"{path}/overlap", draw.facets(common, red, opacity=0.6, on_top=True))
-            low, high = self.shared[number, a, b] = common.bounds
+            low, high = self._shared[number, a, b] = common.bounds
         elif row.distance.point_a is None:
             return
         margin = 0.01 * self.size

@@ -17,7 +17,7 @@ from meshcat.path import Path
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
-from clamp3d.clamp.result import Waypoint
+from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.scene import CONTACT, clamp_scene
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.distance import measure
@@ -27,17 +27,19 @@ from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, rotation
+from clamp3d.output.assembly_steps import between
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.section import Poses as SectionPoses
 from clamp3d.output.section import edge_openings, part_anchor
 from clamp3d.output.wording import (
+    by_group,
     circumstances,
     distance_text,
     first_text,
     group_sentence,
     sentence,
     titles,
-    worst_first,
 )
 
 Poses: TypeAlias = Mapping[str, Array]
@@ -48,6 +50,8 @@ CLEARANCE = 5.0
 LISTED = 500
 """Rows of a table on the page; a result's JSON has all."""
 FIRST = "first contact"
+_SEVERITY = {"error": "clash", "warning": "contact"}
+"""The verdict whose colour a finding of an assembly has."""
 _HOLD = 1.2  # s at each stop
 _FASTEST, _SLOWEST = 0.9, 4.0  # s between two stops
 _MOTION, _SAMPLES = 4.0, 24
@@ -222,66 +226,56 @@ class Timeline:
         return animation
 
 
-class SceneStory:
-    """A checked scene: at rest, then its motions one after the other, with a stop where parts first touch."""
+class Story:
+    """A scene and its stops: a checked one at rest, then its motions one after the other, halting at first contact."""
 
     subtitle = ""
     anchors: Mapping[str, Array] | None = None
     accuracy = "How each distance was measured stands beside it."
+    waiting = "checking ..."
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.title, self._cache = scene, scene.name, ModelCache()
+    def __init__(self, scene: Scene, model: ContactModel | None = None) -> None:
+        self.scene, self.title, self._model, self._cache = scene, scene.name, model, ModelCache()
 
     def measure(self, poses: Poses, pairs: Iterable[Pair]) -> list[Row]:
         """Pairs of the parts at some poses, by the engine that every command uses."""
-        distances = measure(self.scene.moved(poses), pairs, cache=self._cache)
+        distances = measure(self.scene.moved(poses), pairs, model=self._model, cache=self._cache)
         return [Row.of(self.scene, *pair, distance) for pair, distance in distances.items()]
 
-    def stops(self, result: CheckResult) -> Iterator[Stop]:
+    def stops(self, result: CheckResult) -> list[Stop]:
         """All stops of a result."""
-        motions = self.scene.motions
-        poses: Poses = {part.name: part.T_world for part in self.scene.parts}
-        contact = self.scene.contact
-        rows = tuple(Row(row.a, row.b, row.verdict.value, row.distance, contact) for row in result.pairs)
+        motions, scene = self.scene.motions, self.scene
+        rows = tuple(Row(row.a, row.b, row.verdict.value, row.distance, scene.contact) for row in result.pairs)
         marks = [motion.name for motion in motions] + [""]
-        yield Stop("at rest", "at rest", partial(_same, poses), rows, marks[0])
+        poses: Poses = {part.name: part.T_world for part in scene.parts}
+        stops = [Stop("at rest", "at rest", lambda _: poses, rows, marks[0])]
         for motion, mark in zip(motions, marks[1:], strict=True):
-            for stop in self._motion(result, motion, poses, mark):
-                yield stop
-                last = stop
-            poses = last.poses
+            stops += self._motion(result, motion, stops[-1].poses, mark)
+        return stops
 
     def _motion(self, result: CheckResult, motion: Motion, start: Poses, next_mark: str) -> Iterator[Stop]:
         """The stops of a motion: where parts first touch, where they go on to, and the end."""
         going = motion.resolved(start[motion.parts[0]])
-        rows = worst_first([row for row in result.motions if row.motion == motion.name])
+        rows = by_group(result, [row for row in result.motions if row.motion == motion.name])
         pairs = tuple((row.a, row.b) for row in rows[:_MEASURED])
 
-        def at(t: float) -> Poses:
-            return {**start, **{name: going.at(t, start[name]) for name in motion.parts}}
-
         def between(t0: float, t1: float, f: float) -> Poses:
-            return at(t0 + f * (t1 - t0))
+            t = t0 + f * (t1 - t0)
+            return {**start, **{name: going.at(t, start[name]) for name in motion.parts}}
 
         contacts = first_contacts(rows)
         for k, (t0, t) in enumerate(pairwise([0.0, *contacts, 1.0])):
             meets = k < len(contacts)
             label = f"{motion.name}: end" + (", through the contact" if contacts else "")
-            mark, watched = next_mark, pairs
+            mark, watched, way = next_mark, pairs, partial(between, t0, t)
             if meets:
                 label = f"{motion.name}: {'next' if k else 'first'} contact at t = {first_text(t)}"
                 mark, watched = "" if k else FIRST, tuple((row.a, row.b) for row in contacts[t])
-            here = tuple(self.measure(at(t), watched))
+            here = tuple(self.measure(way(1.0), watched))
             if meets:  # the moment is certain; the distance right there may be certain to the contact threshold only
                 here = tuple(replace(row, verdict="contact", what=FIRST) for row in here)
-            keys = max(1, math.ceil(abs(going.angle) * (t - t0) / _TURN))
-            seconds = max(0.3, _MOTION * (t - t0))
-            way = partial(between, t0, t)
+            keys, seconds = max(1, math.ceil(abs(going.angle) * (t - t0) / _TURN)), max(0.3, _MOTION * (t - t0))
             yield Stop(motion.name, label, way, here, mark, pairs, keys, seconds, t, halts=meets and k == 0)
-
-
-def _same(poses: Poses, _: float) -> Poses:
-    return poses
 
 
 def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
@@ -309,11 +303,23 @@ def findings_of(result: CheckResult, timeline: Timeline, *, brief: bool = False)
             yield {
                 **{"a": row.a, "b": row.b, "motion": row.motion, "verdict": row.verdict.value, "group": group.id},
                 "title": group_sentence(group, names),
-                "text": sentence(row, names),
+                "text": sentence([row], names),
                 "detail": circumstances(row) if row is group.worst and not brief else "",
                 "moments": timeline.moments(row.motion),
                 **{"stop": stop, "low": low, "high": high},
             }
+
+
+def findings_of_clamp(run: Assembly, timeline: Timeline, extent: tuple[Array, Array]) -> Iterator[dict[str, Any]]:
+    """The findings of an assembly but the notes, each at the end: at the pair that it names, else at ``extent``."""
+    for k, finding in enumerate(f for f in run.findings if f.severity != "note"):
+        rows = [row for row in timeline.stops[-1].rows if (row.a, row.b) == (finding.a, finding.b)]
+        low, high = focus(rows[0].distance) if rows else extent
+        yield {
+            **{"a": finding.a or "", "b": finding.b or "", "verdict": _SEVERITY[finding.severity], "group": str(k)},
+            **{"title": finding.text, "text": finding.text, "detail": "", "moments": []},
+            **{"stop": len(timeline.stops) - 1, "low": low, "high": high},
+        }
 
 
 def focus(distance: Distance) -> tuple[Array, Array]:
@@ -322,7 +328,7 @@ def focus(distance: Distance) -> tuple[Array, Array]:
     return np.min(points, axis=0), np.max(points, axis=0)
 
 
-class ClampStory:
+class ClampStory(Story):
     """The waypoints of a clamp's assembly as stops; ``clearance`` mm is the gap that counts as clear.
 
     Parameters
@@ -332,64 +338,46 @@ class ClampStory:
         How grooves are measured; by default exactly.
     """
 
+    waiting = "waiting for the first state"
+
     def __init__(self, clamp: Clamp, model: ContactModel | None = None, clearance: float | None = None) -> None:
-        self.clamp, self._model, self._cache = clamp, model, ModelCache()
         still = {name: np.eye(4) for name in TITLES}
-        self.scene = clamp_scene(clamp, still, clearance=CLEARANCE if clearance is None else clearance)
+        super().__init__(clamp_scene(clamp, still, clearance=CLEARANCE if clearance is None else clearance), model)
+        self.clamp = clamp
         anchors = {name: part_anchor(clamp, name) for name in TITLES}
-        self.anchors: Mapping[str, Array] | None = {name: np.array([u, 0.0, -v]) for name, (u, v) in anchors.items()}
+        self.anchors = {name: np.array([u, 0.0, -v]) for name, (u, v) in anchors.items()}
         self.title, self.subtitle = f"{clamp.name} clamp", f"line {clamp.line.label}, jumper {clamp.jumper.label}"
         by = "exactly" if model is None or model.name == "cas" else f"by {model.name}"
         self.accuracy = f"Measured {by}, not on the facets."
-        self._latest: tuple[Poses, float, float] | None = None
+        self._latest: tuple[SectionPoses, float, float] | None = None
         """Where the parts were last, how far the nut was screwed on at first (mm), and how it was turned (rad)."""
-
-    def measure(self, poses: Poses, pairs: Iterable[Pair]) -> list[Row]:
-        """Pairs of the parts at some poses, by the engine that every command uses."""
-        distances = measure(self.scene.moved(poses), pairs, model=self._model, cache=self._cache)
-        return [Row.of(self.scene, *pair, distance) for pair, distance in distances.items()]
 
     def stop(self, waypoint: Waypoint) -> Stop:
         """A waypoint with its 21 pairs; the nut is drawn turned by as much as it has been screwed on."""
-        poses = {name: waypoint.T_world(name) for name in TITLES}
+        poses = waypoint.poses
         rows = [
             Row.of(self.scene, c.a, c.b, c.distance, "" if c.relation == NONE else c.relation, declared=c.declared != 0)
-            for c in measure_contacts(self.clamp, waypoint.poses, self._model, cache=self._cache)
+            for c in measure_contacts(self.clamp, poses, self._model, cache=self._cache)
         ]
         rows.sort(key=lambda row: not row.declared)
-        beside = float(np.abs(poses["P4"][:2, 3] - poses["P5"][:2, 3]).max())
-        on = max(0.0, float(poses["P4"][2, 3] - poses["P5"][2, 3]) + self.clamp.nut.height) if beside < CONTACT else 0.0
+        bolt, nut = poses["P4"], poses["P5"]
+        is_on = max(abs(bolt.x - nut.x), abs(bolt.along - nut.along)) < CONTACT
+        on = max(0.0, nut.y - bolt.y + self.clamp.nut.height) if is_on else 0.0
         start, first, before = self._latest or (poses, on, 0.0)
         turn = -self.clamp.bolt.turn(on - first)  # clockwise
         self._latest = poses, first, turn
-        return Stop(
-            waypoint.step,
-            waypoint.label,
-            partial(_clamp_way, start, poses, before, turn),
-            tuple(rows),
-            waypoint.step,
-            tuple((row.a, row.b) for row in rows),
-            keys=max(1, math.ceil(abs(turn - before) / _SCREWED)),
-            length=self._opening(waypoint),
-        )
+
+        def way(f: float) -> Poses:
+            there = {name: pose.T() for name, pose in between(start, poses, f).items()}
+            return there | {"P5": there["P5"] @ rotation((0.0, 0.0, 1.0), before + f * (turn - before))}
+
+        pairs = tuple((row.a, row.b) for row in rows)
+        keys, length = max(1, math.ceil(abs(turn - before) / _SCREWED)), self._opening(waypoint)
+        words = waypoint.step, waypoint.label
+        return Stop(*words, way, tuple(rows), mark=waypoint.step, pairs=pairs, keys=keys, length=length)
 
     def _opening(self, waypoint: Waypoint) -> tuple[Array, Array, str]:
         """The distance between the splints (Table 4): its ends, and its length in words."""
         height = edge_openings(self.clamp, waypoint.poses)[0]
         top = (waypoint.T_world("P1") @ [0.0, 0.0, -self.clamp.up_splint.thickness, 1.0])[:3]
         return top, top - [0.0, 0.0, height], f"splints {height:.3f} mm"
-
-
-def _clamp_way(start: Poses, end: Poses, before: float, turn: float, f: float) -> Poses:
-    """Parts at a fraction of a straight way, as the viewer draws them; the nut turns from one angle to another."""
-    from scipy.spatial.transform import Rotation, Slerp
-
-    poses = {}
-    for name, T in end.items():
-        poses[name] = T.copy()
-        if f < 1.0:
-            poses[name][:3, 3] = (1.0 - f) * start[name][:3, 3] + f * T[:3, 3]
-            turns = Rotation.from_matrix(np.array([start[name][:3, :3], T[:3, :3]]))
-            poses[name][:3, :3] = Slerp([0.0, 1.0], turns)(f).as_matrix()
-    poses["P5"] = poses["P5"] @ rotation((0.0, 0.0, 1.0), before + f * (turn - before))
-    return poses

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.depth import LONG
 from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.engine.verdict import Verdict
@@ -43,9 +44,27 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
     return f"gap or overlap at most {_rounded(max(upper, -lower), math.ceil)} mm"
 
 
-def distance_text(distance: Distance, *, digits: int = 6) -> str:
-    """`gap_text` of a distance's bounds."""
-    return gap_text(distance.lower, distance.upper, digits=digits)
+def distance_text(*distances: Distance, digits: int = 6) -> str:
+    """`gap_text` of bounds that hold the distances; of pins in holes the interference, and how long the way out is.
+
+    >>> distance_text(Distance(-13.2, -0.03, interference=(0.03, 0.03)))
+    'interference 0.030000 mm, way out up to 13.2 mm'
+    """
+    bounds = [shown_bounds(distance) for distance in distances]
+    text = gap_text(min(low for low, _ in bounds), max(high for _, high in bounds), digits=digits)
+    if any(bound == (d.lower, d.upper) for bound, d in zip(bounds, distances, strict=True)):
+        return text
+    way = -min(distance.lower for distance in distances)
+    out = "" if math.isinf(way) else f", way out up to {_rounded(way, math.ceil)} mm"
+    return text.replace("overlap", "interference") + out
+
+
+def shown_bounds(distance: Distance) -> tuple[float, float]:
+    """Bounds of the signed distance, or of minus the interference where the way out is far longer."""
+    inside = distance.interference
+    if inside is not None and inside[0] > 0.0 and LONG * inside[1] < -distance.lower:
+        return -inside[1], -inside[0]
+    return distance.lower, distance.upper
 
 
 def _rounded(value: float, towards: Callable[[float], int], digits: int | None = None) -> str:
@@ -127,7 +146,7 @@ def headline(result: CheckResult) -> str:
 
 def _clashes(rows: Sequence[PairResult], n_groups: int) -> str:
     """How many clashes there are, how many of them in motion, and how deep the deepest is."""
-    lower, upper = (min(getattr(row.distance, end) for row in rows) for end in ("lower", "upper"))
+    lower, upper = map(min, zip(*(shown_bounds(row.distance) for row in rows), strict=True))
     moving = sum(row.motion is not None for row in rows)
     where = "" if not moving else " in motion" if moving == len(rows) else f" ({moving} in motion)"
     causes = f" in {n_groups} groups" if 1 < n_groups < len(rows) else " of one kind" if n_groups < len(rows) else ""
@@ -142,25 +161,16 @@ def severity(result: CheckResult) -> str:
     return "clean" if result.clean and not result.findings else "note"
 
 
-def sentence(row: PairResult, names: Mapping[str, str]) -> str:
-    """A finding in words."""
-    return _sentence(names[row.a], names[row.b], row.verdict, distance_text(row.distance))
+def sentence(rows: Sequence[PairResult], names: Mapping[str, str], a: str = "", b: str = "") -> str:
+    """Findings of one verdict in words; ``a``, ``b``: what they are of, if not the two parts of the first.
 
-
-def group_sentence(group: Group, names: Mapping[str, str]) -> str:
-    """A group of findings in words.
-
-    >>> from clamp3d.output.groups import Group
     >>> rows = (PairResult("pin", "plate_1", Verdict.CLASH, Distance(-0.2, -0.2)),) * 3
-    >>> group_sentence(Group("", "pin", "plate", rows, -0.2, -0.2), {})
+    >>> sentence(rows, {}, "pin", "plate")
     'pin and plate clash, 3 times: overlap 0.200000 mm'
     """
-    often = f", {len(group.rows)} times" if len(group.rows) > 1 else ""
-    a, b = (names.get(name, name) for name in (group.a, group.b))
-    return _sentence(a, b, group.verdict, gap_text(group.lower, group.upper), often)
-
-
-def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> str:
+    a, b = (names.get(name, name) for name in (a or rows[0].a, b or rows[0].b))
+    often = f", {len(rows)} times" if len(rows) > 1 else ""
+    gap = distance_text(*(row.distance for row in rows))
     phrases = {
         Verdict.DUPLICATE: f"{a} and {b} are the same part twice in one place{often}",
         Verdict.CONTAINED: f"{a} and {b}: one lies inside the other{often}, {gap}",
@@ -170,7 +180,12 @@ def _sentence(a: str, b: str, verdict: Verdict, gap: str, often: str = "") -> st
         Verdict.CONTACT: f"{a} and {b} touch{often}" + ("" if gap == "gap 0.000000 mm" else f": {gap}"),
         Verdict.CLEARANCE: f"{a} and {b} are too close{often}: {gap}",
     }
-    return phrases.get(verdict, f"{a} and {b}{often}: {gap}")
+    return phrases.get(rows[0].verdict, f"{a} and {b}{often}: {gap}")
+
+
+def group_sentence(group: Group, names: Mapping[str, str]) -> str:
+    """A group of findings in words."""
+    return sentence(group.rows, names, group.a, group.b)
 
 
 def circumstances(row: PairResult) -> str:
@@ -221,7 +236,8 @@ def where_text(where: Overlap) -> str:
     return f"shared volume{' of the facets' if where.of_facets else ''} {volume} mm3, within {box} mm"
 
 
-def worst_first(rows: Sequence[PairResult]) -> list[PairResult]:
-    """Rows by verdict, then by distance."""
+def by_group(result: CheckResult, rows: Iterable[PairResult]) -> list[PairResult]:
+    """Rows in the order of the groups of findings, then the others by verdict and distance."""
+    place = {id(row): k for k, row in enumerate(row for group in grouped(result) for row in group.rows)}
     order = list(Verdict)
-    return sorted(rows, key=lambda row: (order.index(row.verdict), row.distance.upper))
+    return sorted(rows, key=lambda row: (place.get(id(row), len(place)), order.index(row.verdict), row.distance.upper))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -118,23 +119,31 @@ def _is_clamp(path: Path) -> bool:
     """Whether the tables of a TOML file are those of a clamp; False: those of a scene."""
     named_toml = path.suffix.lower() == ".toml"
     if not named_toml and not os.path.isfile(path):
-        raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices()}")
+        raise InputError(f"unknown clamp or file {checks.shown(str(path))}; {_choices(path)}")
     try:
         keys = set(parse_toml(read_text(path), str(path)))
     except InputError:
         if named_toml:
             raise
-        raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices()}") from None
+        raise InputError(f"{checks.short(path)}: unknown kind of file; {_choices(path)}") from None
     of_clamp, of_scene = {f.name for f in fields(Clamp)}, {*SceneTable.__struct_fields__}
     as_clamp, as_scene = len(keys & of_clamp - of_scene), len(keys & of_scene - of_clamp)
     if not as_clamp and not as_scene:
         raise InputError(
             f"{checks.short(path)}: neither a clamp ([up_splint], [line], ...) nor a scene ([parts.NAME], [clamp], ...)"
+            + _hint(path)
         )
     return as_clamp > as_scene
 
 
-def _choices() -> str:
+def _choices(path: Path) -> str:
     built_in = ", ".join(builtin_clamps())
     files = ", ".join((*FORMATS, ROBOT))
-    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files})"
+    return f"built in: {built_in}; or give a clamp or scene file (.toml), a folder, or a file ({files}){_hint(path)}"
+
+
+def _hint(path: Path) -> str:
+    """The ending that a misspelt one is like."""
+    endings = (".toml", *FORMATS, ROBOT)
+    near = difflib.get_close_matches(path.suffix.lower(), endings, n=1, cutoff=0.75)
+    return f"; did you mean {near[0]}?" if near and near[0] != path.suffix.lower() else ""

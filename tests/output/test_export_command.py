@@ -113,16 +113,13 @@ def test_review_set_is_what_a_new_build_gives() -> None:
 
 
 def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(clamp3d, tmp_path: Path, capfd) -> None:
-    """The jumper is in its groove, the saddle on the bolt still waits below; a blocked order leaves no file."""
+    """The jumper is in its groove, the saddle on the bolt still waits below."""
     order = ("--sequence", "P1 -> P7 -> P2 -> P3|P4 -> P5")
     assert clamp3d("export", "-f", "glb", "-o", tmp_path / "a", *order, "--state", "P7") == 0
     listing = json.loads((tmp_path / "a" / "manifest-glb.json").read_text())
     place = {name: np.array(listing["parts"][name]["T_world_part"])[:3, 3] for name in PARTS}
     assert abs(place["P7"][0] - place["P1"][0]) < 137.0
     assert place["P3"][2] < place["P1"][2] - 150.0
-    assert clamp3d("export", "-f", "glb", "-o", tmp_path / "b", "--sequence", "P1|P2P3P4P5 -> P2 -> P7") == 1
-    assert "sequence step 3, P7: no way" in capfd.readouterr().err
-    assert not (tmp_path / "b").exists()
     assert clamp3d("export", "-f", "stl", "-o", tmp_path / "c", *order) == 2
 
 

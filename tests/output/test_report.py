@@ -27,7 +27,6 @@ from clamp3d.output.report_page import report_csv, report_html, write_report
 
 ROOT = Path(__file__).resolve().parents[2]
 LOOSE = {"line": "LGJ-10/2", "jumper": "LJ-150"}
-WIRES = [{}, {"line": "LJ-500", "jumper": "LJ-185"}]
 
 
 @pytest.fixture(scope="module")
@@ -156,11 +155,9 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     assert (rows["block-near"].verdict, rows["block-near"].severity) == ("clearance", "note")
     assert rows["block-near"].distance.value == pytest.approx(0.3, abs=1e-6)
     (pushed,) = (row for row in found.motions if row.name == "far-near")
-    assert pushed.result.contact_at == pytest.approx((60 - 2.5 - 30.3) / 30, abs=1e-3)
+    assert pushed.contact_at == pytest.approx((60 - 2.5 - 30.3) / 30, abs=1e-3)
     lines = list(csv.DictReader(io.StringIO(report_csv(found))))
-    assert [(line["a"], line["b"]) for line in lines] == [
-        (r.result.a, r.result.b) for r in (*found.rows, *found.motions)
-    ]
+    assert [(line["a"], line["b"]) for line in lines] == [(r.a, r.b) for r in (*found.rows, *found.motions)]
     assert not [cell for line in lines for cell in line.values() if cell[:1] in ("[", "{")]  # a number a column
     (hit,) = (line for line in lines if line["b"] == "wire" and line["verdict"] == "clash")
     assert 0.0 < float(hit["volume_at_least_mm3"]) <= float(hit["volume_at_most_mm3"])
@@ -172,12 +169,12 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     data = json.loads(report(clashing, tmp_path)[1].read_text())
     assert (data["passed"], data["headline"]) == (False, found.headline)
     assert [f["text"] for f in data["findings"]] == [f.text for f in found.findings]
-    assert [(p["a"], p["b"]) for p in data["pairs"]] == [(r.result.a, r.result.b) for r in found.rows]
+    assert [(p["a"], p["b"]) for p in data["pairs"]] == [(r.a, r.b) for r in found.rows]
     engine = measure(clashing)
     for pair in data["pairs"]:
         assert pair["distance_mm"] == pytest.approx(engine[pair["a"], pair["b"]].value, abs=1e-9)
     motion = next(m for m in data["motions"] if {m["a"], m["b"]} == {"far", "near"})
-    assert motion["contact_at"] == pushed.result.contact_at
+    assert motion["contact_at"] == pushed.contact_at
 
 
 def test_scenes_without_findings_pairs_or_parts(tmp_path):
@@ -193,10 +190,14 @@ def test_scenes_without_findings_pairs_or_parts(tmp_path):
     assert "Parts of pairs that are not clear: 2 of 41 parts." in page
 
 
-def test_folder_that_cannot_be_written_leaves_nothing(reference_report, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "clamp3d.output.report_page._pictures", lambda *_: {kind: [] for kind in ("overview", "steps", "pairs")}
-    )
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Pages without their pictures, which take long."""
+    nothing = {kind: [] for kind in ("overview", "steps", "pairs")}
+    monkeypatch.setattr("clamp3d.output.report_page._pictures", lambda *_: nothing)
+
+
+def test_folder_that_cannot_be_written_leaves_nothing(reference_report, tmp_path, no_pictures):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "pairs.csv").mkdir()
     with pytest.raises(InputError, match=r"pairs\.csv"):
@@ -204,14 +205,14 @@ def test_folder_that_cannot_be_written_leaves_nothing(reference_report, tmp_path
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["pairs.csv"]
 
 
-def test_command_says_not_clamped_by_its_exit_code(tmp_path, monkeypatch, main):
+def test_command_says_not_clamped_by_its_exit_code(tmp_path, monkeypatch, no_pictures, main):
     monkeypatch.chdir(tmp_path)
     code, _, err = main("report", "--line", LOOSE["line"], "--jumper", LOOSE["jumper"], "-q", "-o", "out")
     assert (code, err) == (1, "")
     assert "Not passed: not clamped" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, main):
+def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, no_pictures, main):
     monkeypatch.chdir(tmp_path)
     hinge = ROOT / "examples" / "hinge"
     assert main("report", hinge / "scene.toml", "-q", "-o", "out")[0] == 1

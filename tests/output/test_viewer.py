@@ -1,5 +1,6 @@
 """The viewer without a browser: what is sent, where it is served, and that nothing is left behind."""
 
+import base64
 import contextlib
 import itertools
 import json
@@ -32,8 +33,8 @@ from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import translation
 from clamp3d.output import placed, serving
-from clamp3d.output.palette import VERDICT_COLOURS, part_colours
-from clamp3d.output.serving import MeshcatServer, PageServer
+from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS, part_colours
+from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer, view
 from clamp3d.output.viewer_story import ClampStory
 
@@ -66,11 +67,7 @@ def plate_and_pin(travel=30.0):
     scene = Scene(name="pin over plate", clearance=0.5)
     scene = scene.add("plate", shapes.box((50.0, 40.0, 4.0)), translation(0.0, 0.0, -2.0))
     scene = scene.add("pin", shapes.cylinder(5.0, 20.0), translation(3.0, 0.0, 20.0))
-    return Scene(**(scene_fields(scene) | {"motions": (Motion.translate((0, 0, -travel), parts="pin", name="down"),)}))
-
-
-def scene_fields(scene):
-    return {"parts": scene.parts, "name": scene.name, "clearance": scene.clearance}
+    return scene.with_motion(Motion.translate((0, 0, -travel), parts="pin", name="down"))
 
 
 def read(url, host=None):
@@ -82,7 +79,7 @@ def read(url, host=None):
 @contextlib.contextmanager
 def serve(port=None, answer=dict):
     server = PageServer(port=port)
-    server.start(lambda: "<div id='meshcat-pane'></div>", list, answer)
+    server.start(lambda: "<div id='meshcat-pane'></div>", CommandLog(), answer)
     try:
         yield server
     finally:
@@ -322,7 +319,7 @@ def test_equal_parts_are_meshed_and_written_once(monkeypatch):
         shape = shapes.cylinder(3, 10) if k % 3 == 0 else shapes.box((5, 5, 5))  # equal, not the same
         scene = scene.add(f"p{k}", shape, translation(20.0 * k, 0, 0))
     with view(scene, serve=False) as viewer:
-        messages = [umsgpack.unpackb(message) for message in viewer._log.messages()]
+        messages = [umsgpack.unpackb(base64.b64decode(message)) for message in viewer._log.messages()]
     assert len(made) == 2
     assert len(drawn) == 2
     sent = [message for message in messages if message["type"] == "set_geometry"]
@@ -341,7 +338,7 @@ def test_equal_parts_are_meshed_and_written_once(monkeypatch):
     assert used == seen
 
 
-def test_page_under_a_foreign_name_is_refused():
+def test_a_foreign_name_or_another_file_is_refused():
     with serve() as server:
         with pytest.raises(urllib.error.HTTPError, match="403"):
             read(server.url + "answer", "evil.example")
@@ -350,6 +347,9 @@ def test_page_under_a_foreign_name_is_refused():
                 read(server.url, host)
         for host in ("127.0.0.1", f"localhost:{server.port}", "[::1]"):
             assert "meshcat-pane" in read(server.url, host)
+        for path in ("main.js", "../other.html", "etc/passwd"):
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                read(server.url + path)
 
 
 def test_second_viewer_takes_the_next_port_and_closing_frees_it():
@@ -403,8 +403,10 @@ def test_colours_of_verdicts_differ_for_colour_blind_readers(eyes):
     seen = {name: lab(VERDICT_COLOURS[name], DICHROMATS[eyes]) for name in ("clash", "contact", "clearance", "clear")}
     for a, b in itertools.combinations(seen, 2):
         assert np.linalg.norm(seen[a] - seen[b]) > 25, (a, b)
-    for colour in part_colours([f"part {k}" for k in range(8)]).values():
-        assert np.linalg.norm(lab(colour, DICHROMATS[eyes]) - seen["clash"]) > 15, colour
+    parts = [lab(colour, DICHROMATS[eyes]) for colour in part_colours([f"part {k}" for k in range(8)]).values()]
+    assert min(np.linalg.norm(part - seen["clash"]) for part in parts) > 15
+    clamps = [lab(PART_COLOURS[name], DICHROMATS[eyes]) for name in ("P1", "P2", "P3", "P6", "P7")]
+    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(clamps, 2)) > 8
 
 
 def test_port_that_is_taken_is_an_error_that_says_so():
@@ -421,13 +423,6 @@ def test_a_bad_question_is_answered_with_what_is_wrong():
             with pytest.raises(urllib.error.HTTPError, match="400") as refused:
                 read(f"{viewer.url}answer?{query}")
             assert message in json.loads(refused.value.read())["error"]
-
-
-def test_other_files_are_not_served():
-    with serve() as server:
-        for path in ("main.js", "../other.html", "etc/passwd"):
-            with pytest.raises(urllib.error.HTTPError, match="404"):
-                read(server.url + path)
 
 
 def test_without_a_meshcat_server_there_is_an_error(monkeypatch):
@@ -482,14 +477,14 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path, ma
     assert not answers(int(re.search(r":(\d+)/", said)[1]))
 
 
-@pytest.mark.parametrize("command", [["view"], ["run", "--view"]])
-def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path, main):
+def test_a_blocked_sequence_is_shown_on_one_page(tmp_path, main):
     page = tmp_path / "page.html"
-    code, out, _ = main(*command, "--timeout", "0", "--html", page, "--sequence", "P1|P2P3P4P5 -> P2 -> P7")
+    order = "P1|P2P3P4P5 -> P2 -> P7"
+    code, out, _ = main("run", "--view", "--timeout", "0", "--html", page, "--sequence", order)
     assert code == 1
     said, *shown = out.splitlines()
     assert said.startswith("not assembled: sequence step 3, P7")
-    assert sum(line.startswith("http://") for line in shown) == (command != ["view"])  # a page in a file is not served
+    assert sum(line.startswith("http://") for line in shown) == 1
     assert "P7 from" in page.read_text()
 
 
@@ -502,6 +497,7 @@ def test_a_blocked_sequence_is_shown_on_one_page(command, tmp_path, main):
         (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
         (["view", "--draw-error", "-1", "--timeout", "0"], "mesh_error"),
         (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
+        (["view", "bearing.stpe"], "; did you mean .stp?"),
         (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
         (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
         (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),

@@ -10,8 +10,6 @@ import math
 import os
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,15 +70,16 @@ def run():
     return assemble("reference")
 
 
-@pytest.fixture
-def saved(browser, tmp_path):
+@pytest.fixture(scope="module")
+def saved(browser, tmp_path_factory):
     """Opens what is shown as a saved page, without a network; no error may come up in it."""
-    pages = []
+    files, pages = {}, []
 
     def save(shown, fragment="", **options):
-        path = tmp_path / "page.html"
-        view(shown, serve=False).save_html(path)
-        page = open_page(browser, path.as_uri() + fragment, offline=True, **options)
+        if shown not in files:
+            files[shown] = tmp_path_factory.mktemp("page") / "page.html"
+            view(shown, serve=False).save_html(files[shown])
+        page = open_page(browser, files[shown].as_uri() + fragment, offline=True, **options)
         wait_for(page, "document.querySelector('.part')")
         page.wait_for_timeout(200)
         pages.append(page)
@@ -98,7 +97,12 @@ def hinge():
     return check(load(str(EXAMPLES / "hinge" / "scene.toml")).moved({"pin": translation(0.4, 0.0, 0.0)}))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def hinge_page(saved, hinge):
+    return saved(hinge)
+
+
+@pytest.fixture(scope="module")
 def two_boxes(saved):
     scene = Scene().add("left", shapes.box((10, 10, 10))).add("right", shapes.box((10, 10, 10)), translation(30, 0, 0))
     return saved(check(scene, distances=True))
@@ -235,8 +239,8 @@ def test_page_steps_through_the_sequence(saved, run):
     assert opacity(page, "P6") == 1.0
 
 
-def test_findings_of_a_check_lead_to_their_places(saved, hinge):
-    page = saved(hinge)
+def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
+    page = hinge_page
     assert page.title().startswith(hinge.scene.name)
     assert re.match(r"\d+ clash", page.inner_text("#headline"))
     rows = [row for group in grouped(hinge) for row in group.rows]
@@ -261,9 +265,10 @@ def test_findings_of_a_check_lead_to_their_places(saved, hinge):
             assert red[:, 370:].sum() > 100
 
 
-def test_play_halts_at_first_contact_and_goes_on_when_asked(saved, hinge):
-    page = saved(hinge)
-    contact = next(stop["arrive"] for stop in view(hinge, serve=False).story["stops"] if stop["halts"])
+def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
+    page = hinge_page
+    place = page.get_attribute("#marks .halts", "style")
+    contact = float(re.search(r"([\d.]+)%", place)[1]) / 100.0 * float(page.get_attribute("#time", "max"))
     seek(page, contact - 0.4)
     page.click("#play")
     wait_for(page, f"!viewer.animator.playing && viewer.animator.time > {contact}")
@@ -307,8 +312,8 @@ def test_page_in_dark_mode_is_dark_and_readable(saved, hinge):
         assert contrast(page, selector) > 4.5, selector  # WCAG 2.2, level AA
 
 
-def test_a_screen_reader_can_name_everything(saved, hinge):
-    page = saved(hinge)
+def test_a_screen_reader_can_name_everything(hinge_page):
+    page = hinge_page
     tree = page.locator("body").aria_snapshot()
     controls = re.findall(r"- (button|checkbox|slider|searchbox|combobox|img)( \"[^\"]+\")?", tree)
     assert {role for role, _ in controls} == {"button", "checkbox", "slider", "searchbox", "combobox", "img"}
@@ -321,20 +326,21 @@ def test_a_screen_reader_can_name_everything(saved, hinge):
     assert page.evaluate("document.activeElement.classList.contains('now')")
 
 
-@pytest.mark.parametrize(("scheme", "dark"), [("dark", True), ("light", False)])
-def test_page_of_a_fit_follows_the_scheme(browser, tmp_path, scheme, dark):
+def test_page_of_a_fit_follows_the_scheme(browser, tmp_path):
     path = tmp_path / "fit.html"
     tube = mesh(shapes.cylinder(5.0, 20.0))
     path.write_text(fit_to_html(fit_mesh(make_mesh(tube.vertices, tube.faces))), encoding="utf-8")
-    page = open_page(browser, path.as_uri(), offline=True, color_scheme=scheme)
-    page.wait_for_timeout(300)
-    image = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    page = open_page(browser, path.as_uri(), offline=True)
     corner = page.locator("#view").bounding_box()
-    for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
-        assert (image[y, x].max() < 70) == dark
-        assert (image[y, x].min() > 200) == (not dark)
-    for selector in ("h1", "p", "td", "th", "dd", ".pm"):
-        assert contrast(page, selector) > 4.5, selector
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        page.reload()
+        page.wait_for_timeout(300)
+        image = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
+        for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
+            assert image[y, x].min() > 200 if scheme == "light" else image[y, x].max() < 70
+        for selector in ("h1", "p", "td", "th", "dd", ".pm"):
+            assert contrast(page, selector) > 4.5, (scheme, selector)
     assert page.problems == []
     page.context.close()
 
@@ -357,30 +363,18 @@ def contrast(page, selector):
     return (max(light) + 0.05) / (min(light) + 0.05)
 
 
-@pytest.mark.parametrize("javascript", [True, False])
-def test_findings_can_be_read_without_webgl_or_script(hinge, javascript, tmp_path):
+def test_findings_can_be_read_without_webgl_or_script(browser, hinge, tmp_path):
     path = tmp_path / "check.html"
     path.write_text(check_to_html(hinge), encoding="utf-8")
-    # A browser of its own: its WebGL is switched off for good, and playwright's loop runs in this process already.
-    code = f"""
-from playwright.sync_api import sync_playwright
-with sync_playwright() as playwright:
-    arguments = ["--no-sandbox", "--disable-gpu", "--disable-3d-apis"]
-    browser = playwright.chromium.launch(executable_path={chromium()!r}, args=arguments)
-    page = browser.new_context(offline=True, java_script_enabled={javascript}).new_page()
-    page.on("pageerror", lambda error: print("error:", error))
-    page.goto({path.as_uri()!r})
-    page.wait_for_timeout(500)
-    print(page.inner_text("body"))
-    print("stage:", page.is_visible("#stage"))
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "error:" not in done.stdout
-    assert "stage: False" in done.stdout
-    assert ("cannot draw 3D" in done.stdout) == javascript
-    assert ("Scripts are off" in done.stdout) != javascript
-    for group in grouped(hinge):
-        assert f"{group.a} and {group.b}" in done.stdout
+    blind = browser.browser_type.launch(executable_path=chromium(), args=["--no-sandbox", "--disable-3d-apis"])
+    for javascript in (True, False):
+        page = open_page(blind, path.as_uri(), offline=True, java_script_enabled=javascript)
+        words = page.inner_text("body")
+        assert ("cannot draw 3D" in words, "Scripts are off" in words) == (javascript, not javascript)
+        assert not page.is_visible("#stage")
+        for group in grouped(hinge):
+            assert f"{group.a} and {group.b}" in words
+    blind.close()
 
 
 def test_served_page_follows_the_run_and_measures_between_the_stops(browser, run):
@@ -466,6 +460,7 @@ def test_meshcat_server_that_was_there_before(browser, run):
 
 def test_a_section_hides_what_is_before_it(two_boxes):
     page = two_boxes
+    page.keyboard.press("Escape")
     middles = on_screen(page, [(0.0, -5.0, 0.0), (30.0, -5.0, 0.0)])
 
     def named():
@@ -519,6 +514,8 @@ def test_two_clicks_measure_also_on_a_cut(two_boxes):
 
 def test_a_part_can_be_named_isolated_ghosted_and_hidden(two_boxes):
     page = two_boxes
+    page.select_option("#section-axis", "")
+    page.keyboard.press("Escape")
     ((x, y),) = on_screen(page, [(30.0, -5.0, 0.0)])
     page.mouse.click(x, y)
     assert page.inner_text("#identity b") == "right"
@@ -533,10 +530,12 @@ def test_a_part_can_be_named_isolated_ghosted_and_hidden(two_boxes):
     assert opacity(page, "left") == 0.0
 
 
-def test_the_address_names_the_finding_and_the_camera(saved, hinge):
+def test_the_address_names_the_finding_and_the_camera(saved, hinge_page, hinge):
     group = grouped(hinge)[-1]
-    page = saved(hinge, f"#finding={group.id}")
-    assert page.get_attribute(".finding.now", "data-id") == group.id
+    page = hinge_page
+    page.evaluate("id => { location.hash = 'finding=' + id; }", group.id)
+    wait_for(page, f"document.querySelector('.finding.now')?.dataset.id === '{group.id}'")
+    page.wait_for_timeout(200)
     page.mouse.move(800, 300)
     page.mouse.down()
     page.mouse.move(900, 340)

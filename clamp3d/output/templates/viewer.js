@@ -359,6 +359,15 @@ function clamp3dViewer(messages, done) {
       for (const s of Object.values(switches)) if (s.touched) s.apply();
     }
   };
-  for (const m of messages) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0)));
-  if (served) viewer.connect();
+  const add = (news) => { for (const m of news) viewer.handle_command_bytearray(Uint8Array.from(atob(m), (c) => c.charCodeAt(0))); };
+  // A served page asks for what is new until the result is there.
+  async function listen() {
+    for (let since = 0; !story || !story.done;) {
+      const news = await (await fetch("commands?since=" + since)).json();
+      add(news.messages);
+      since = news.count;
+    }
+  }
+  add(messages);
+  if (served) listen().catch(() => {});  // the program has ended
 }
