@@ -61,15 +61,6 @@ class StepRow:
         return "; ".join([*words, *rests, *loose])
 
 
-@dataclass(frozen=True, slots=True)
-class TighteningRow:
-    """A stage of the tightening: ``turns`` of the nut in it, ``way`` mm the bolt is drawn up, gap of the saddle."""
-
-    turns: float
-    way: float
-    saddle_gap: float
-
-
 def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     """The state at every waypoint of an assembly."""
     clamp, start, last = assembly.clamp, *_last_step(assembly)
@@ -96,18 +87,21 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     return tuple(rows)
 
 
-def tightening_rows(assembly: Assembly) -> tuple[TighteningRow, ...]:
-    """The nut's own step: in equal stages where it is one straight way, else where that changes."""
+def tightening(assembly: Assembly) -> list[dict[str, float]]:
+    """The nut's own step: in equal stages where it is one straight way, else where that changes.
+
+    Turns of the nut in it, by how much the bolt is drawn up, and the gap of the saddle; mm.
+    """
     before, last = _last_step(assembly)
-    after = last[0].poses
-    stages = [between(before, after, float(f)) for f in np.linspace(0.0, 1.0, TIGHTENING_STAGES + 1)]
+    ways = np.linspace(0.0, 1.0, TIGHTENING_STAGES + 1)
+    stages = [between(before, last[0].poses, float(f)) for f in ways]
     rows = []
     for poses in stages if len(last) == 1 else [before, *(waypoint.poses for waypoint in last)]:
         way = _screwed(poses) - _screwed(before)
         (saddle,) = measure_contacts(assembly.clamp, poses, assembly.model, pairs=[("P2", "P3")])
         gap = 0.0 if abs(saddle.gap) <= CONTACT else saddle.gap
-        rows.append(TighteningRow(way / assembly.clamp.bolt.pitch, way, gap))
-    return tuple(rows)
+        rows.append({"nut_turns": way / assembly.clamp.bolt.pitch, "way_mm": way, "saddle_gap_mm": gap})
+    return rows
 
 
 def between(start: Poses, end: Poses, f: float) -> dict[PartName, SectionPose]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import ctypes
 import uuid
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import trimesh
 
 from clamp3d.errors import InputError, need
 from clamp3d.files.bodies import Component
@@ -19,9 +20,6 @@ from clamp3d.files.formats import UNITS_MM
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.palette import rgb
 from clamp3d.output.placed import PosedMesh
-
-if TYPE_CHECKING:
-    import trimesh
 
 _3MF_UNITS = {"mm": "MilliMeter", "cm": "CentiMeter", "m": "Meter", "in": "Inch"}
 _Z_UP_TO_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
@@ -58,8 +56,6 @@ def ply(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
 
 def obj(items: Sequence[PosedMesh], title: str, unit: str, mtl_name: str) -> tuple[bytes, bytes]:
     """Wavefront OBJ with one named object per part, and its MTL with the colours."""
-    import trimesh
-
     scene = trimesh.Scene()
     for item in items:
         name = item.label.replace(" ", "_")
@@ -84,8 +80,6 @@ def glb(items: Sequence[PosedMesh], title: str, unit: str, mesh_error: float) ->
 
     Parts from a file stand in its tree of assemblies. Parts of one shape and colour share a mesh.
     """
-    import trimesh
-
     # trimesh identifies nodes by their names, its own root among them: unique keys here, the names at the end.
     names = {"root": title}
     scene = trimesh.Scene()
@@ -209,8 +203,6 @@ def _check_rounding(format: str, items: Sequence[PosedMesh], unit: str) -> None:
 
 def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
     """A part's mesh in the world in a file's unit, without negative zeros, in its colour."""
-    import trimesh
-
     vertices = item.world / UNITS_MM[unit] + 0.0
     colours = np.tile(np.array([*rgb(item.colour), 255], dtype=np.uint8), (len(vertices), 1))
     return trimesh.Trimesh(vertices, item.mesh.faces, vertex_colors=colours, process=False)
@@ -218,6 +210,4 @@ def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
 
 def _joined(items: Sequence[PosedMesh], unit: str) -> trimesh.Trimesh:
     """All meshes as one."""
-    import trimesh
-
     return trimesh.util.concatenate([_mesh(item, unit) for item in items])  # type: ignore[return-value]

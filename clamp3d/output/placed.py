@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import trimesh
 
 from clamp3d.checks import items, text
 from clamp3d.clamp.dimensions import Clamp
@@ -18,9 +18,6 @@ from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape, Shape
 from clamp3d.output.palette import part_colours
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +77,6 @@ def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
 def overlap(a: PosedMesh, b: PosedMesh) -> trimesh.Trimesh | None:
     """What two parts share, in the world, by manifold3d; None where their facets do not meet."""
     import manifold3d
-    import trimesh
 
     # Not by trimesh, whose booleans round to single precision.
     first, second = (
@@ -95,8 +91,6 @@ def overlap(a: PosedMesh, b: PosedMesh) -> trimesh.Trimesh | None:
 
 
 def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
-    import trimesh
-
     if not isinstance(shape, MeshShape):
         return mesh(shape, mesh_error)
     errors = {"mesh_error": 0.0, "chord_error": shape.error}

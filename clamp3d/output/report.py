@@ -19,7 +19,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.result import BAD, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Thresholds, Verdict
-from clamp3d.output.assembly_steps import StepRow, TighteningRow, step_rows, tightening_rows
+from clamp3d.output import assembly_steps
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.pages import render
 from clamp3d.output.wording import distance_text, group_text, headline, sentence, titles
@@ -101,14 +101,14 @@ class Report:
     assembly: Assembly | None = None
 
     @cached_property
-    def steps(self) -> tuple[StepRow, ...]:
+    def steps(self) -> tuple[assembly_steps.StepRow, ...]:
         """How a clamp comes together."""
-        return step_rows(self.assembly) if self.assembly else ()
+        return assembly_steps.step_rows(self.assembly) if self.assembly else ()
 
     @cached_property
-    def tightening(self) -> tuple[TighteningRow, ...]:
+    def tightening(self) -> list[dict[str, float]]:
         """The stages of the nut's own step."""
-        return tightening_rows(self.assembly) if self.assembly else ()
+        return assembly_steps.tightening(self.assembly) if self.assembly else []
 
     @property
     def modelled(self) -> list[str]:

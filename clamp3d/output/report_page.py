@@ -77,9 +77,7 @@ def report_to_dict(report: Report) -> dict[str, Any]:
             }
             for number, s in enumerate(report.steps, 1)
         ]
-        data["tightening"] = [
-            {"nut_turns": t.turns, "way_mm": t.way, "saddle_gap_mm": t.saddle_gap} for t in report.tightening
-        ]
+        data["tightening"] = report.tightening
     return data | {
         "made": f"{now():%Y-%m-%d %H:%M} UTC",
         "versions": _versions(),

@@ -11,6 +11,9 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
+import shapely.affinity
+from shapely.plotting import patch_from_polygon
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
@@ -82,29 +85,21 @@ def _draw_part(ax: Axes, part: Solid, pose: SectionPose, holes: bool, style: dic
 
 
 def _polygon(body: Extrusion) -> Any:
-    import shapely
-
     return shapely.Polygon(outline(body).polygon(_CHORD_ERROR))
 
 
 def _drilled(part: Solid) -> Any:
     """Where the section cuts the holes of a part, which run down it."""
-    import shapely
-
     spans = [(hole.profile.bounds, hole) for hole in part.holes]
     return shapely.union_all([shapely.box(u0, -h.end, u1, -h.start) for ((u0, _), (u1, _)), h in spans])
 
 
 def _patch(region: Any, pose: SectionPose, **style: Any) -> PathPatch:
     """A region (u, v) of a part as a patch of the axes."""
-    import shapely
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
     c, s = math.cos(pose.angle), math.sin(pose.angle)
-    region = shapely.affinity.affine_transform(region, [c, s, -s, c, pose.x, pose.y])
-    rings = [ring for polygon in shapely.get_parts(region) for ring in (polygon.exterior, *polygon.interiors)]
-    return PathPatch(Path.make_compound_path(*(Path(ring.coords, closed=True) for ring in rings)), **style)
+    placed = shapely.affinity.affine_transform(region, [c, s, -s, c, pose.x, pose.y])
+    patch: PathPatch = patch_from_polygon(placed, **style)
+    return patch
 
 
 def outline(body: Extrusion) -> Profile:
@@ -124,8 +119,6 @@ def _front_edges(profile: Profile) -> list[float]:
 
 def part_anchor(clamp: Clamp, name: PartName, *, right: bool = True) -> tuple[float, float]:
     """A point (u, v) in the part's material as the section shows it, for its name; ``right``: near its right end."""
-    import shapely
-
     part = parts(clamp)[name]
     area = shapely.union_all([_polygon(body) for body in part.bodies]).difference(_drilled(part))
     if right and name not in WIRES:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.engine.result import BAD, CheckResult
-from clamp3d.files.open_cascade import bounds_of, moved, to_bytes, volume_of
+from clamp3d.files.open_cascade import bounds_of, moved, occ, to_bytes, volume_of
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.shapes import MeshShape
@@ -35,9 +35,7 @@ def shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error:
 
 
 def _exact(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
-
-    shape: Any = BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in (a, b))).Shape()
+    shape: Any = occ.BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in (a, b))).Shape()
     volume = volume_of(shape)
     return BrepSolid(name, to_bytes(shape), bounds_of(shape), volume) if volume > 0.0 else None
 

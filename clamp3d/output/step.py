@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.files.bodies import Component
-from clamp3d.files.open_cascade import explore, location, parse
-from clamp3d.files.solid import BrepSolid, require_open_cascade
+from clamp3d.files.open_cascade import explore, location, occ, parse
+from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.geometry.profile import Arc
@@ -33,36 +33,27 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     Parts from a file stand in its tree of assemblies, the others in the assembly ``title``. Raises InputError for a
     part that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
     """
-    require_open_cascade()
-    from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.Interface import Interface_Static
-    from OCP.STEPCAFControl import STEPCAFControl_Writer
-
     tree = _Tree(title, placed)
-    writer = STEPCAFControl_Writer()
-    before = Interface_Static.CVal_s("write.step.unit")
-    Interface_Static.SetCVal_s("write.step.unit", UNITS[unit])
+    writer = occ.STEPCAFControl_Writer()
+    before = occ.Interface_Static.CVal_s("write.step.unit")
+    occ.Interface_Static.SetCVal_s("write.step.unit", UNITS[unit])
     try:
-        stream, done = io.BytesIO(), IFSelect_ReturnStatus.IFSelect_RetDone
+        stream, done = io.BytesIO(), occ.IFSelect_ReturnStatus.IFSelect_RetDone
         if not writer.Transfer(tree.document) or writer.WriteStream(stream) != done:
             raise Clamp3dError(f"Open CASCADE could not write {title} as STEP")
         return stream.getvalue()
     finally:
-        Interface_Static.SetCVal_s("write.step.unit", before)
+        occ.Interface_Static.SetCVal_s("write.step.unit", before)
 
 
 class _Tree:
     """A document of Open CASCADE (XDE) with a product for each shape, and a component for each place of one."""
 
     def __init__(self, title: str, placed: Sequence[PlacedPart]) -> None:
-        from OCP.TCollection import TCollection_ExtendedString
-        from OCP.TDocStd import TDocStd_Document
-        from OCP.XCAFDoc import XCAFDoc_DocumentTool
-
-        self.document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-        XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)  # metres: the shapes are in mm
-        self._shapes = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
-        self._colours = XCAFDoc_DocumentTool.ColorTool_s(self.document.Main())
+        self.document = occ.TDocStd_Document(occ.TCollection_ExtendedString("XmlOcaf"))
+        occ.XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)  # metres: the shapes are in mm
+        self._shapes = occ.XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
+        self._colours = occ.XCAFDoc_DocumentTool.ColorTool_s(self.document.Main())
         self._products: dict[tuple[int, bool], tuple[Any, str]] = {}
         self._assemblies: dict[Component | None, tuple[Any, Array]] = {}
         if len(placed) == 1 and _stands_alone(placed[0]):
@@ -109,12 +100,10 @@ class _Tree:
         return self._products[key]
 
     def _paint(self, label: Any, colour: str) -> None:
-        from OCP.Quantity import Quantity_Color
-        from OCP.XCAFDoc import XCAFDoc_ColorType
 
-        value = Quantity_Color()
-        Quantity_Color.ColorFromHex_s(colour, value)
-        self._colours.SetColor(label, value, XCAFDoc_ColorType.XCAFDoc_ColorGen)
+        value = occ.Quantity_Color()
+        occ.Quantity_Color.ColorFromHex_s(colour, value)
+        self._colours.SetColor(label, value, occ.XCAFDoc_ColorType.XCAFDoc_ColorGen)
 
 
 def _stands_alone(item: PlacedPart) -> bool:
@@ -132,10 +121,8 @@ def _top(component: Component) -> Component:
 
 def _named(label: Any, text: str) -> Any:
     """The label with a name."""
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
 
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(text, True))
+    occ.TDataStd_Name.Set_s(label, occ.TCollection_ExtendedString(text, True))
     return label
 
 
@@ -144,45 +131,39 @@ def solid(part: Solid) -> Any:
 
     Raises MissingLibraryError without Open CASCADE.
     """
-    require_open_cascade()
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-    from OCP.BRepCheck import BRepCheck_Analyzer
-
     shape = _prism(part.bodies[0])
     for body in part.bodies[1:]:
-        shape = BRepAlgoAPI_Fuse(shape, _prism(body)).Shape()
+        shape = occ.BRepAlgoAPI_Fuse(shape, _prism(body)).Shape()
     for hole in part.holes:
-        shape = BRepAlgoAPI_Cut(shape, _prism(hole, _THROUGH)).Shape()
+        shape = occ.BRepAlgoAPI_Cut(shape, _prism(hole, _THROUGH)).Shape()
     solids = [*explore(shape, "SOLID")]
-    if len(solids) != 1 or not BRepCheck_Analyzer(solids[0]).IsValid():
+    if len(solids) != 1 or not occ.BRepCheck_Analyzer(solids[0]).IsValid():
         raise Clamp3dError(f"Open CASCADE makes no valid solid of {part.name}")
     return solids[0]
 
 
 def _prism(shape: Extrusion, overlap: float = 0.0) -> Any:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-    from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Vec
 
     frame = shape.frame
     along = frame[:, 2]
     level = shape.start - overlap
 
     def point(ab: tuple[float, float]) -> Any:
-        return gp_Pnt(*(frame @ [*ab, level]).tolist())
+        return occ.gp_Pnt(*(frame @ [*ab, level]).tolist())
 
-    outline = BRepBuilderAPI_MakeWire()
+    outline = occ.BRepBuilderAPI_MakeWire()
     for edge in shape.profile.edges:
         if isinstance(edge, Arc):
             # Open CASCADE's parameter grows: a concave arc runs about the reversed axis.
             sense = 1.0 if edge.sweep > 0 else -1.0
-            axes = gp_Ax2(point(edge.centre), gp_Dir(*(sense * along).tolist()), gp_Dir(*frame[:, 0].tolist()))
-            made = BRepBuilderAPI_MakeEdge(gp_Circ(axes, edge.radius), sense * edge.start_angle, sense * edge.end_angle)
+            normal, first = (occ.gp_Dir(*v.tolist()) for v in (sense * along, frame[:, 0]))
+            circle = occ.gp_Circ(occ.gp_Ax2(point(edge.centre), normal, first), edge.radius)
+            made = occ.BRepBuilderAPI_MakeEdge(circle, sense * edge.start_angle, sense * edge.end_angle)
         else:
-            made = BRepBuilderAPI_MakeEdge(point(edge.start), point(edge.end))
+            made = occ.BRepBuilderAPI_MakeEdge(point(edge.start), point(edge.end))
         outline.Add(made.Edge())
-    face = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
-    return BRepPrimAPI_MakePrism(face, gp_Vec(*(along * (shape.length + 2.0 * overlap)).tolist())).Shape()
+    face = occ.BRepBuilderAPI_MakeFace(outline.Wire()).Face()
+    return occ.BRepPrimAPI_MakePrism(face, occ.gp_Vec(*(along * (shape.length + 2.0 * overlap)).tolist())).Shape()
 
 
 def exact_solid(item: PlacedPart) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -103,22 +102,15 @@ def arrow(
     """
     radius = 0.035 * length if thickness is None else 0.5 * thickness
     head = min(8.5 * radius, 0.8 * length)
-    shaft = trimesh.creation.cylinder(radius, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, length - head]], sections=16)
-    tip = trimesh.creation.cone(3.0 * radius, head, sections=24)
-    tip.apply_translation([0.0, 0.0, length - head])
-    both = joined([shaft, tip])
+    outline = [[0.0, 0.0], [radius, 0.0], [radius, length - head], [3.0 * radius, length - head], [0.0, length]]
+    mesh = trimesh.creation.revolve(np.array(outline), sections=24)
     turn: Array = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], direction)  # type: ignore[no-untyped-call]
-    both.apply_transform(turn)
-    both.apply_translation(start)
-    return facets(both, colour, on_top=on_top)
+    mesh.apply_transform(turn)
+    mesh.apply_translation(start)
+    return facets(mesh, colour, on_top=on_top)
 
 
-def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Several meshes as one."""
-    return trimesh.util.concatenate(list(meshes))  # type: ignore[return-value]
-
-
-def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str = INK) -> g.Object:
+def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0) -> g.Object:
     """A text on a rounded ground that always faces the viewer and keeps its size on the screen; ``at`` (3,) mm."""
 
     class Sprite(g.Object):  # type: ignore[misc]
@@ -134,7 +126,7 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str 
     class SpriteMaterial(g.GenericMaterial):  # type: ignore[misc]
         _type = "SpriteMaterial"
 
-    png, aspect = _text_image(text, colour, ink)
+    png, aspect = _text_image(text, colour)
     # Without size attenuation a sprite of scale 1 is as high as the camera is far; 100 undoes the scene's mm.
     height = 100.0 * 0.014 * size
     matrix = np.diag([height * aspect, height, 1.0, 1.0])
@@ -147,7 +139,7 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0, ink: str 
 
 
 @lru_cache(maxsize=256)
-def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
+def _text_image(text: str, colour: str) -> tuple[bytes, float]:
     """PNG of a text in a rounded box, and its width / height."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -158,7 +150,7 @@ def _text_image(text: str, colour: str, ink: str) -> tuple[bytes, float]:
     picture = Image.new("RGBA", (width, height), (0, 0, 0, 0))
     draw = ImageDraw.Draw(picture)
     draw.rounded_rectangle((1, 1, width - 2, height - 2), height // 2 - 2, fill=colour, outline=INK, width=2)
-    draw.text((width / 2, height / 2), text, fill=ink, font=font, anchor="mm")
+    draw.text((width / 2, height / 2), text, fill=INK, font=font, anchor="mm")
     out = io.BytesIO()
     # A third of the bytes that a picture with all colours has: labels are most of a page of thousands of parts.
     picture.quantize(_SHADES, Image.Quantize.FASTOCTREE).save(out, format="PNG")

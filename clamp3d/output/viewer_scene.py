@@ -183,7 +183,7 @@ class SceneDrawing:
             for i, colour in enumerate(_OVERLAY_COLOURS):  # neighbours differ; a part may have hundreds of pieces
                 some = meshes[i :: len(_OVERLAY_COLOURS)]
                 if some:
-                    joined = draw.joined(some)
+                    joined: Any = trimesh.util.concatenate(list(some))
                     self._put(f"{path}/pieces {i + 1}", draw.facets(joined, colour, opacity=0.35))
                     self._put(f"{path}/edges {i + 1}", draw.lines(draw.sharp_edges(joined), darker(colour, 0.6)))
 

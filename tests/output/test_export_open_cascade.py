@@ -14,6 +14,7 @@ from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.check import check
 from clamp3d.engine.scene import Scene
+from clamp3d.files.formats import UNITS_MM
 from clamp3d.geometry import shapes
 from clamp3d.geometry.pose import translation
 from clamp3d.output.export import export
@@ -27,21 +28,28 @@ from clamp3d.files.open_cascade import explore
 from tests.output.step_reader import bounds, read_step
 
 
-@pytest.mark.parametrize("unit", ["mm", "in", "m"])
-def test_step_assembly(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, unit: str) -> None:
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [("mm", "SI_UNIT(.MILLI.,.METRE.)"), ("in", "CONVERSION_BASED_UNIT('INCH'"), ("m", "SI_UNIT($,.METRE.)")],
+)
+def test_step_assembly(
+    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, capfd, unit: str, words: str
+) -> None:
     written = export(odd_scene, tmp_path, format="step", unit=unit)
-    text = written.files[0].read_text()
-    assert {"mm": "SI_UNIT(.MILLI.,.METRE.)", "in": "CONVERSION_BASED_UNIT('INCH'", "m": "SI_UNIT($,.METRE.)"}[
-        unit
-    ] in text
+    assert capfd.readouterr().out == ""  # stdout is for data
+    assert words in written.files[0].read_text()
     leaves = read_step(written.files[0])
+    listing = json.loads(written.manifest.read_text())
+    assert (listing["unit"], listing["mesh_error_mm"]) == (unit, None)
     assert [leaf.path for leaf in leaves] == [("reference", f"{name} {TITLES[name]}") for name in PARTS]
     for name, product in zip(PARTS, leaves, strict=True):
-        part = parts(reference)[name]
+        part, entry = parts(reference)[name], listing["parts"][name]
         np.testing.assert_allclose(product.T, odd_poses[name][:3], atol=1e-9)
-        assert product.volume == pytest.approx(part.volume, rel=1e-9)
-        np.testing.assert_allclose(bounds(product.shape), part.bounds_at(odd_poses[name]), atol=2e-6)
-        assert product.colour == PART_COLOURS[name]
+        assert product.volume == pytest.approx(part.volume, rel=1e-9) == entry["volume_mm3"]
+        box = bounds(product.shape)
+        np.testing.assert_allclose(box, part.bounds_at(odd_poses[name]), atol=2e-6)
+        np.testing.assert_allclose(np.array(entry["bounds"]) * UNITS_MM[unit], box, atol=2e-6)
+        assert (product.colour, entry["chord_error_mm"]) == (PART_COLOURS[name], 0.0)
 
 
 def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp, tmp_path: Path) -> None:
@@ -62,18 +70,6 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp
         "P6": {16.335: 1},
         "P7": {7.125: 1},
     }
-
-
-def test_step_manifest(odd_scene: Scene, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    written = export(odd_scene, tmp_path, format="step")
-    assert capfd.readouterr().out == ""  # stdout is for data
-    listing = json.loads(written.manifest.read_text())
-    assert (listing["unit"], listing["mesh_error_mm"]) == ("mm", None)
-    for name, product in zip(PARTS, read_step(written.files[0]), strict=True):
-        entry = listing["parts"][name]
-        assert entry["chord_error_mm"] == 0.0
-        assert entry["volume_mm3"] == pytest.approx(product.volume, rel=1e-9)
-        np.testing.assert_allclose(entry["bounds"], bounds(product.shape), atol=2e-6)
 
 
 @pytest.mark.parametrize("suffix", ["step", "glb"])

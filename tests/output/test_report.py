@@ -104,10 +104,11 @@ def test_steps_are_what_a_line_worker_sees(reference_report):
     assert last.turns == pytest.approx(reference_report.assembly.turns)
     assert steps[-2].turns == 0.0
     stages = reference_report.tightening
-    assert stages[-1].turns == pytest.approx(last.turns)
-    assert [s.saddle_gap for s in stages] == sorted((s.saddle_gap for s in stages), reverse=True)
-    assert stages[-1].saddle_gap == 0.0
-    assert np.diff([s.way for s in stages]) == pytest.approx(stages[-1].way / 4)
+    assert stages[-1]["nut_turns"] == pytest.approx(last.turns)
+    gaps = [s["saddle_gap_mm"] for s in stages]
+    assert gaps == sorted(gaps, reverse=True)
+    assert gaps[-1] == 0.0
+    assert np.diff([s["way_mm"] for s in stages]) == pytest.approx(stages[-1]["way_mm"] / 4)
 
 
 def sources(page):
