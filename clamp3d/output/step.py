@@ -14,7 +14,7 @@ import numpy as np
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.files.bodies import Component
 from clamp3d.files.open_cascade import explore, location, occ, parse
-from clamp3d.files.solid import BrepSolid
+from clamp3d.files.solid import BrepSolid, require_open_cascade
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.geometry.profile import Arc
@@ -33,6 +33,7 @@ def step(placed: Sequence[PlacedPart], title: str, unit: str) -> bytes:
     Parts from a file stand in its tree of assemblies, the others in the assembly ``title``. Raises InputError for a
     part that is a mesh, MissingLibraryError without Open CASCADE, Clamp3dError if that fails.
     """
+    require_open_cascade()
     tree = _Tree(title, placed)
     writer = occ.STEPCAFControl_Writer()
     before = occ.Interface_Static.CVal_s("write.step.unit")

@@ -49,6 +49,8 @@ def distance_text(*distances: Distance, digits: int = 6) -> str:
 
     >>> distance_text(Distance(-13.2, -0.03, interference=(0.03, 0.03)))
     'interference 0.030000 mm, way out up to 13.2 mm'
+    >>> distance_text(Distance(-0.37, -0.37), Distance(-0.32, -0.32))
+    'overlap 0.32 to 0.37 mm'
     """
     bounds = [shown_bounds(distance) for distance in distances]
     text = gap_text(min(low for low, _ in bounds), max(high for _, high in bounds), digits=digits)

@@ -165,18 +165,6 @@ def test_an_assembly_of_build123d_goes_round(tmp_path):
     assert {leaf.label: tuple(leaf.color)[:3] for leaf in read.leaves} == {"rod": (0, 0, 1), "lid": (1, 0, 0)}
 
 
-def test_a_bearing_of_bd_warehouse_keeps_its_rollers(tmp_path):
-    bd = pytest.importorskip("build123d")
-    bearing = pytest.importorskip("bd_warehouse.bearing")
-    bd.export_step(bearing.SingleRowDeepGrooveBallBearing(size="M8-22-7", bearing_type="SKT"), tmp_path / "in.step")
-    before, scene = read_step(tmp_path / "in.step"), load(tmp_path / "in.step")
-    after = read_step(export(scene, tmp_path / "out.step").files[0])
-    assert [leaf.name for leaf in after] == [part.name for part in scene.parts]
-    for was, leaf in zip(before, after, strict=True):
-        assert_same(leaf, was, was.colour or leaf.colour)
-    assert len({leaf.solid for leaf in after}) == len({leaf.solid for leaf in before})
-
-
 def test_glb_has_the_tree_and_shares_meshes_of_one_colour(machine, tmp_path):
     scene = load(machine)
     read = trimesh.load_scene(export(scene, tmp_path / "machine.glb").files[0])

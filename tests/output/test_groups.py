@@ -105,11 +105,12 @@ def test_a_pin_that_is_too_thick_is_told_by_how_much_not_by_its_way_out():
 
 def test_the_table_of_pairs_goes_by_groups():
     """The single fault is first in it too, before deeper overlaps of another kind."""
-    result = check(rail([0.3] * 3 + [0.9, 0.9, 0.05]))
+    result = check(rail([0.32, 0.32, 0.37, 0.9, 0.9, 0.05]))
     pairs = [(row.a, row.b) for group in grouped(result) for row in group.rows]
     table = check_to_text(result).partition("pair ")[2].splitlines()[1 : 1 + len(pairs)]
     assert [line.split("  ")[1] for line in table] == [f"{a} - {b}" for a, b in pairs]
     assert pairs[0] == ("rail", "nut_5")
+    assert "clash, 3 times: overlap 0.32 to 0.37 mm; worst" in check_to_text(result)
 
 
 @pytest.mark.parametrize("n_clashes", [0, 1])
