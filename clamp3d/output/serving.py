@@ -43,8 +43,8 @@ class CommandLog:
     >>> log = CommandLog()
     >>> for x in (1.0, 2.0):
     ...     log.add({"type": "set_property", "path": "/a", "property": "scale", "value": [x, x, x]})
-    >>> len(log.messages())
-    1
+    >>> len(log.messages()), len(log.messages(since=1)), len(log.messages(since=2))
+    (1, 1, 0)
     """
 
     def __init__(self) -> None:

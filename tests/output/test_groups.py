@@ -232,4 +232,5 @@ def test_bcf_has_a_topic_with_parts_camera_and_picture_for_each_group(tmp_path, 
         )
         assert np.linalg.norm(direction) == pytest.approx(1.0)
         assert np.abs(at).max() < 0.2  # metres
+        assert direction @ (np.array([0.009, 0.0, 0.0]) - at) > 0.01  # it looks at the parts
     assert seen == {("a", "b"), ("b", "c")}

@@ -46,6 +46,11 @@ def test_the_nearer_block_hides_the_other_in_every_order() -> None:
         assert image[0, 0, 3] == 0.0  # outside of both: nothing
 
 
+def test_a_picture_is_as_large_as_what_it_shows() -> None:
+    image, _ = scene([block((4, 1, 4), (0, 0, 0), "#FF0000")])
+    assert (image[..., 3] > 0.0).sum() == pytest.approx(32 * 32, rel=0.01)  # 32 of 40 pixels are block
+
+
 def test_hidden_edges_are_not_drawn() -> None:
     """A small block behind a large one leaves no line; in front of it, its four front edges (and those behind them)."""
     small, large = "#FF0000", "#0000FF"

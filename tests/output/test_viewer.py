@@ -117,6 +117,13 @@ def test_animation_reaches_every_waypoint_in_turn(recorded):
             )
 
 
+def test_the_way_to_a_stop_takes_as_long_as_it_is(recorded):
+    viewer, assembly = recorded
+    for (a, start), (b, end) in itertools.pairwise(zip(viewer.story["stops"], assembly.path, strict=True)):
+        length = max(np.linalg.norm((end.T_world(part) - start.T_world(part))[:3, 3]) for part in assembly.poses)
+        assert b["arrive"] - a["leave"] == pytest.approx(np.clip(2.0 * length / viewer._drawing.size, 0.9, 4.0))
+
+
 def test_nut_turns_as_often_as_the_assembly_says_and_clockwise_from_above(recorded):
     viewer, assembly = recorded
     clip = animation_of(viewer)["/clamp3d/parts/P5"]

@@ -76,10 +76,11 @@ def saved(browser, tmp_path_factory):
     files, pages = {}, []
 
     def save(shown, fragment="", **options):
-        if shown not in files:
-            files[shown] = tmp_path_factory.mktemp("page") / "page.html"
-            view(shown, serve=False).save_html(files[shown])
-        page = open_page(browser, files[shown].as_uri() + fragment, offline=True, **options)
+        if id(shown) not in files:
+            path = tmp_path_factory.mktemp("page") / "page.html"
+            view(shown, serve=False).save_html(path)
+            files[id(shown)] = path, shown
+        page = open_page(browser, files[id(shown)][0].as_uri() + fragment, offline=True, **options)
         wait_for(page, "document.querySelector('.part')")
         page.wait_for_timeout(200)
         pages.append(page)
