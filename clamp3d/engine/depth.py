@@ -102,7 +102,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         upper = min(upper, -depth)
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
-    return distance.labelled("depth", f"{distance.method}; way out by meshes (FCL)")
+    return replace(distance, level="depth", method=f"{distance.method}; way out by meshes (FCL)")
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:
