@@ -6,7 +6,10 @@ keeps its clearance over any stretch. A polyhedron is swept into the hull of its
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,40 +35,30 @@ def swept_lower(
     if not screw:  # seen from a, the points of b are on spirals, which no arc bounds
         a, b, there, back = b, a, back, there
     best = np.inf
-    for x in a.enclosing:
-        for y in b.enclosing:
-            low = _one_way(x, y, there, angle)
-            if screw:
-                low = max(low, _bores(y, x, back, angle))
-            best = min(best, low - x.error - y.error)
+    for x, y in itertools.product(a.enclosing, b.enclosing):
+        bounds = [*_bounds(x, y, there, angle)]
+        if screw:
+            bounds += _bounds(replace(y, outers=()), x, back, angle)
+        best = min(best, max(bounds, default=-np.inf) - x.error - y.error)
     return float(best)
 
 
-def _one_way(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
-    best = _bores(still, moving, poses, angle)
-    for piece in still.outers:
-        for other in moving.outers:
-            if isinstance(other, Rod):
-                swept: Convex = _swept_rod(other, poses, angle)
-                best = max(best, convex_distance(piece, np.eye(4), swept, poses[1], sharp=False).lower)
-            else:
-                around, sag = _swept_hull(other, poses, angle)
-                best = max(best, convex_distance(piece, np.eye(4), around, np.eye(4), sharp=False).lower - sag)
-    return best
+def _bounds(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> Iterator[float]:
+    """Lower bounds of the distance from each bore and piece of ``still`` and each swept piece of ``moving``."""
+    for piece in moving.outers:
+        if isinstance(piece, Rod):
+            rod = _swept_rod(piece, poses, angle)
+            yield from (bore_rod(bore, rod, poses[1]).lower for bore in still.bores)
+            swept: Convex = rod
+            place, sag = poses[1], 0.0
+        else:
+            (swept, sag), place = _swept_hull(piece, poses, angle), np.eye(4)
+        for other in still.outers:
+            yield convex_distance(other, np.eye(4), swept, place, sharp=False).lower - sag
 
 
-def _bores(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> float:
-    best = -np.inf
-    for bore in still.bores:
-        for piece in moving.outers:
-            if isinstance(piece, Rod):
-                best = max(best, bore_rod(bore, _swept_rod(piece, poses, angle), poses[1]).lower)
-    return best
-
-
-def _swept_hull(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
+def _swept_hull(piece: Hull, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
     """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
-    assert isinstance(piece, Hull)
     ways = np.array([to_target(T, piece.vertices) for T in poses])
     return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
 

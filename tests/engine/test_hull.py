@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Verdict, check, distance
-from clamp3d.engine.hull import hull
+from clamp3d.engine.hull import hull, hull_error
 from clamp3d.engine.scene import Scene
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.pose import translation
@@ -68,3 +68,11 @@ def test_a_small_rise_is_seen(rise):
     found = distance(plate(rise), box((10.0, 10.0, 10.0)), translation(0.0, 0.0, 5.0 + 1e-3))
     assert found.lower <= 1e-3 - rise <= found.upper
     assert found.upper - found.lower < 1e-9
+
+
+def test_a_dent_in_a_face_is_within_the_error_of_the_hull():
+    """The middle of a face is pressed in by 1e-7 mm: the hull covers it, and says so."""
+    cube = trimesh.creation.box((10.0, 10.0, 10.0)).subdivide()
+    V = np.array(cube.vertices)
+    V[np.argmax(V @ (1.0, 1e-3, 1e-3) - np.abs(V[:, 1:]).sum(axis=1)), 0] -= 1e-7
+    assert 0.9e-7 <= hull_error(V, np.array(cube.faces)) <= 1e-6

@@ -75,7 +75,10 @@ def test_what_goes_past_an_open_mesh_is_clear():
 
 
 def test_surfaces_that_cross_are_a_clash():
-    assert row(CUP, shapes.box((4, 4, 4)), translation(6.0, 0.5, 0.3)).verdict.value == "clash"
+    found, cup = row(CUP, shapes.box((4, 4, 4)), translation(6.0, 0.5, 0.3)), replace(CUP, error=0.1)
+    assert found.verdict.value == "clash"
+    loose = row(cup, shapes.box((4, 4, 4)), translation(6.0, 0.5, 0.3))  # what is stated of the mesh counts off
+    assert loose.distance.upper == pytest.approx(found.distance.upper + 0.1, abs=1e-9)
 
 
 @st.composite
