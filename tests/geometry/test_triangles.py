@@ -13,7 +13,7 @@ numbers = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
 
 
 @given(hnp.arrays(float, (5, 3, 3), elements=numbers), hnp.arrays(float, (5, 3), elements=numbers))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=150)
 def test_nearest_points_of_triangles(triangles, points):
     """No further away than trimesh's, and points of the triangles (of no area too)."""
     found = closest_points(triangles, points)

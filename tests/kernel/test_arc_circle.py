@@ -115,7 +115,7 @@ def test_bad_values_are_named(values: tuple[float, ...], name: str) -> None:
 ANY = st.floats(-15.0, 15.0)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(half=st.floats(0.01, 3.13), r=st.floats(0.05, 12.0), x=ANY, y=ANY)
 def test_against_a_dense_arc(half: float, r: float, x: float, y: float) -> None:
     """Distance over 20001 points of the arc; relation of the disk and the region as polygons."""

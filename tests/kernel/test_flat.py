@@ -28,7 +28,7 @@ def random_scene(rng):
 def test_agrees_with_branch_and_bound_from_the_definition():
     rng = np.random.default_rng(7)
     seen, narrow = set(), 0
-    for _ in range(800):
+    for _ in range(400):
         groove, wire, T = random_scene(rng)
         R = groove.radius
         low, high = flat_truth(R, groove.half_angle, groove.length, wire.radius, wire.length, T, 1e-9 * R, 10_000)
@@ -42,7 +42,7 @@ def test_agrees_with_branch_and_bound_from_the_definition():
             assert low - slack <= found.distance <= high + slack, (groove, wire, T.tolist())
             assert found.error_bound < 1e-12 * (np.abs(T[:3, 3]).max() + R + wire.radius + groove.length + wire.length)
     assert len(seen) == 2 * len(Feature)
-    assert narrow > 260
+    assert narrow > 120
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def depth_in(wire, T, points):
 
 def test_witnesses_lie_on_both_bodies_and_the_normal_is_unit():
     rng = np.random.default_rng(8)
-    for _ in range(3000):
+    for _ in range(1500):
         groove, wire, T = random_scene(rng)
         a = signed_distance(groove, wire, T)
         tol = 1e-11 * max(groove.radius, groove.length, wire.length, np.abs(T[:3, 3]).max())
@@ -92,14 +92,14 @@ def test_witnesses_lie_on_both_bodies_and_the_normal_is_unit():
 def test_capsule_is_never_farther_and_equal_where_the_normal_is_square_to_the_axis():
     rng = np.random.default_rng(10)
     equal = 0
-    for _ in range(3000):
+    for _ in range(1500):
         groove, wire, T = random_scene(rng)
         flat, round_ = (signed_distance(groove, shape(wire.radius, wire.length), T) for shape in (Cylinder, Capsule))
         assert round_.distance <= flat.distance + flat.error_bound
         if round_.distance >= 0.0 and abs(round_.normal @ T[:3, 2]) < 1e-15:
             equal += 1
             assert abs(flat.distance - round_.distance) <= flat.error_bound
-    assert equal > 500
+    assert equal > 250
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ GROOVES = st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.1, 3.0), st.floa
 SIZES = st.tuples(st.floats(0.5, 14.0), st.floats(0.2, 90.0))
 
 
-@settings(SLOW, max_examples=60)
+@settings(SLOW, max_examples=40)
 @given(GROOVES, SIZES, st.sampled_from([Cylinder, Capsule]), poses(25.0))
 def test_apart_it_is_the_distance_and_negative_exactly_in_an_overlap(groove, sizes, kind, T):
     wire = kind(*sizes)
@@ -30,7 +30,7 @@ def test_apart_it_is_the_distance_and_negative_exactly_in_an_overlap(groove, siz
         assert common(groove, wire, T, accuracy=1e-3).lower <= 0.0
 
 
-@settings(SLOW, max_examples=60)
+@settings(SLOW, max_examples=40)
 @given(GROOVES, SIZES, poses(12.0))
 def test_a_cylinder_that_shrinks_by_the_inset_comes_free(groove, sizes, T):
     """Radius and both ends shrink alike: by less than the inset it still overlaps, by more it does not."""

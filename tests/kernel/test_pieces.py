@@ -53,7 +53,7 @@ def test_each_piece_is_the_distance_from_its_own_surface():
     """With the axis in the material, of a side piece times the cosine of the way about the lip to the deepest point."""
     rng = np.random.default_rng(6)
     inside = 0
-    for k in range(600):
+    for k in range(300):
         groove, wire = SweptArc(12.0, rng.uniform(0.2, 3.0), 40.0), Capsule(2.0, rng.choice([3.0, 30.0, 120.0]))
         T = rotation(rng.normal(size=3), rng.choice([0.0, 1e-3, 0.2, 1.0, 2.0]))
         s, h = 12.0 * math.sin(groove.half_angle), -12.0 * math.cos(groove.half_angle)
@@ -82,7 +82,7 @@ def test_each_piece_is_the_distance_from_its_own_surface():
             if factor <= 0.0 or free[row] > 1e-6:  # else the axis goes through the piece
                 expected = factor * (free if factor > 0.0 else deepest)[row]
                 assert found.distance[row] + 2.0 == pytest.approx(expected, abs=1e-4)
-    assert inside > 100
+    assert inside > 50
 
 
 def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
@@ -99,7 +99,7 @@ def test_gradients_are_the_differences_where_those_agree_from_both_sides():
     """Those of the end faces also with the wire's end deep in the material, whichever way out is the shorter."""
     groove, step = SweptArc(7.0, 1.0, 20.0), 1e-6
     rng, compared, through = np.random.default_rng(4), 0, {-1: 0, 1: 0}
-    for _ in range(400):
+    for _ in range(250):
         wire = Capsule(float(rng.uniform(1.0, 6.0)), float(rng.uniform(4.0, 60.0)))
         T = rotation(rng.normal(size=3), float(rng.uniform(-1.5, 1.5)))
         T[:3, 3] = rng.uniform((-15.0, -25.0, -25.0), (15.0, 5.0, 25.0))
@@ -114,8 +114,8 @@ def test_gradients_are_the_differences_where_those_agree_from_both_sides():
         for row, sign in ((3, -1.0), (4, 1.0)):
             if here.distance[row] < -wire.radius and abs(abs(here.gradient[row, 2]) - 1.0) < 1e-9:
                 through[int(sign * here.gradient[row, 2])] += 1
-    assert compared > 3000
-    assert min(through.values()) > 10
+    assert compared > 1900
+    assert min(through.values()) > 5
 
 
 def test_normals_of_all_pieces_are_the_way_out():

@@ -103,7 +103,7 @@ def corners(r: Rectangle) -> list[tuple[float, float]]:
     return [r.point(u * r.half_width, v * r.half_height) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     x=st.floats(-8.0, 8.0),
     y=st.floats(-12.0, 12.0),

@@ -54,7 +54,7 @@ def test_lip_of_a_major_arc_is_touched_from_both_sides():
         assert groove_relation(groove, Capsule(3.0, 80.0), T, tolerance=1e-9).relation.value == wanted
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.floats(0.2, 2.9), st.floats(0.5, 11.9), st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
 def test_parallel_wire_agrees_with_the_plane_relation(half, r, x, y):
     # Only outside the material: the arc of the plane relation is a curve, without material behind it.

@@ -25,7 +25,7 @@ def moved(T, v, step):
 def test_gradient_is_that_of_central_differences_at_smooth_poses(shape):
     rng = np.random.default_rng(20)
     smooth = {"apart": 0, "overlap": 0, "inside": 0}
-    for _ in range(4000):
+    for _ in range(2000):
         groove, wire, T = random_scene(rng)
         if rng.random() < 0.3:  # into the material
             T[1, 3] -= 2.0 * groove.radius
@@ -42,7 +42,7 @@ def test_gradient_is_that_of_central_differences_at_smooth_poses(shape):
         smooth[kind] += 1
         wanted = (d[3] - d[1]) / (2.0 * step)
         assert abs(a.gradient @ v - wanted) < 1e-3, (groove, wire, T.tolist(), v.tolist(), a)
-    assert min(smooth.values()) > 300, smooth
+    assert min(smooth.values()) > 150, smooth
 
 
 def one_sided(groove, wire, T, v, step):
@@ -67,7 +67,7 @@ def test_one_sided_derivatives_at_ties_are_the_least_rates(shape, name):
     groove, wire = SweptArc(12.0, math.pi / 3, 50.0), shape(radius, length)
     found = generalised_gradient(groove, wire, T)
     rng = np.random.default_rng(21)
-    for _ in range(200):
+    for _ in range(60):
         v = rng.normal(size=6) * [1, 1, 1, 0.02, 0.02, 0.02]
         change = one_sided(groove, wire, T, v, 1e-4)
         least = (found.rates @ v).min()
