@@ -32,6 +32,8 @@ _EXACT = 1e-9
 """Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
 LONG = 3.0
 """Ratio of a way out to the interference from which on that is measured exactly too."""
+QUICK_CHORD = 0.005
+"""Chord error (mm) for depths of solids from CAD where no distances are asked for: half the usual contact threshold."""
 _CLOSE = 1.05
 """Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
@@ -65,7 +67,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     distance : Distance
         What `refine` says of them; returned as it is where they are apart.
     fine : bool
-        Measure solids from CAD on their fine meshes; else on the coarse ones, which mostly gave the verdict already.
+        Measure solids from CAD on their finest meshes; else on those of `QUICK_CHORD`.
 
     Returns
     -------
@@ -78,13 +80,12 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     interference = (max(0.0, -distance.upper), max(0.0, -distance.lower))
     exact = depth_of_pieces(a, b, T)
     if exact is not None:
-        return replace(exact, upper=max(exact.lower, min(exact.upper, distance.upper)), interference=interference)
+        upper = max(exact.lower, min(exact.upper, distance.upper))
+        return replace(exact, upper=upper, interference=interference, level=distance.level)
     unknown = replace(distance, lower=-np.inf, interference=interference)
     if not (a.chords and b.chords):
         return unknown
-    outer_a, outer_b = (
-        model.outer(model.chords[0 if model.exact and not fine else min(1, len(model.chords) - 1)]) for model in (a, b)
-    )
+    outer_a, outer_b = (model.outer(_depth_chord(model, fine)) for model in (a, b))
     shared = common(outer_a, outer_b, T)
     if shared is None:
         return unknown
@@ -93,7 +94,8 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     depth = max(interference[0], attested)
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, depth)
-    if length > LONG * depth and a.exact is not None and b.exact is not None:
+    hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it exactly
+    if length > LONG * (depth + hidden) and a.exact is not None and b.exact is not None:
         from clamp3d.engine.exact import exact_overlap
 
         # A pin's way out of a hole says nothing of how much it is too thick.
@@ -102,7 +104,13 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         upper = min(upper, -depth)
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
-    return replace(distance, level="depth", method=f"{distance.method}; way out by meshes (FCL)")
+    return replace(distance, method=f"{distance.method}; way out by meshes (FCL)")
+
+
+def _depth_chord(model: Model, fine: bool) -> float:
+    """Chord error (mm) of the mesh that the depth of a part is measured on."""
+    finest = model.chords[min(1, len(model.chords) - 1)]
+    return max(finest, QUICK_CHORD) if model.exact and not fine and model.refines else finest
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:
