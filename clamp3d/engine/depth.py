@@ -102,6 +102,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         by_points = exact_overlap(a, b, T, SHARES[0])
         depth, interference = max(depth, -by_points.upper), (depth, min(interference[1], -by_points.lower))
         upper = min(upper, -depth)
+        distance = replace(distance, method=by_points.method) if np.isfinite(by_points.lower) else distance
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
     return replace(distance, method=f"{distance.method}; way out by meshes (FCL)")

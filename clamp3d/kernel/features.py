@@ -194,10 +194,9 @@ def beside_line(wu: float, wv: float, du: float, dv: float, most: float) -> tupl
     """
     cross = wu * dv - wv * du
     square = du * du + dv * dv
-    if cross * cross >= most * square:  # the distance of the lines
+    if square <= TINY or cross * cross >= most * square:  # parallel: an end is as near; else the distance of the lines
         return math.inf, 0.0
-    over = 1.0 / max(square, TINY)
-    return cross * cross * over, -(wu * du + wv * dv) * over
+    return cross * cross / square, -(wu * du + wv * dv) / square
 
 
 @inlined

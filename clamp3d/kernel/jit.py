@@ -1,14 +1,14 @@
 """How the kernels are compiled: by numba, which keeps them in NUMBA_CACHE_DIR or beside the source files.
 
-numba keeps a kernel until the file that it stands in changes. It does not notice a change in a formula of another file:
-whoever edits one removes the kernels that were kept (`find . -name "*.nb[ci]" -delete`).
 Importing this module imports numba, which takes 0.2 s of CPU: functions import their kernels when they call them.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -20,6 +20,14 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": True}
 # Code with which Python and C would call a function is a fifth of the time to compile. Formulas have none.
 _INTERNAL: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+_FOLDER = Path(__file__).resolve().parent
+_SOURCES = (
+    *sorted(_FOLDER.glob("*.py")),
+    *(_FOLDER.parent / "geometry" / name for name in ("pose.py", "primitives.py")),
+)
+_CONFIG: Any = numba.config  # its names come from the environment
+_NUMBA_FOLDER = _CONFIG.CACHE_DIR
 
 
 def formula(function: _F) -> _F:
@@ -34,6 +42,12 @@ def inlined(function: _F) -> _F:
     return compiled
 
 
+def cache_folder(sources: Sequence[Path]) -> str:
+    """Where kernels made from these sources are kept: numba itself watches the file alone that a kernel stands in."""
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    return str(Path(_NUMBA_FOLDER or Path(__file__).parent / "__pycache__") / f"kernel-{digest[:16]}")
+
+
 def entry(signature: Any) -> Callable[[_F], _F]:
     """Decorator of a kernel that Python calls with arguments of these types alone.
 
@@ -43,12 +57,15 @@ def entry(signature: Any) -> Callable[[_F], _F]:
 
     def decorate(function: _F) -> Any:
         notice = _Notice()
+        _CONFIG.CACHE_DIR = cache_folder(_SOURCES)
         with event.install_listener("numba:compile", notice):
             try:
                 return numba.njit(signature, cache=True, **_OPTIONS)(function)
             except RuntimeError:  # no folder can be written
                 notice.when = " in every run: set NUMBA_CACHE_DIR to a folder that can be written"
                 return numba.njit(signature, **_OPTIONS)(function)
+            finally:
+                _CONFIG.CACHE_DIR = _NUMBA_FOLDER
 
     return decorate
 

@@ -215,7 +215,7 @@ class SceneDrawing:
             return
         margin = 0.01 * self.size
         self._put(f"{path}/box", draw.box(low - margin, high + margin, red))
-        self._label(f"{path}/value", row.gap, high + margin, "#FFFFFF", 0.7)
+        self._label(f"{path}/value", row.gap.partition(",")[0], high + margin, "#FFFFFF", 0.7)
 
     def _dot(self, path: str, point: Array, colour: str) -> None:
         T = np.eye(4)

@@ -135,8 +135,8 @@ def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
     made = make_report(run)
     assert [row.turns for row in made.steps][:5] == [0.0] * 5
     assert made.steps[-1].turns == pytest.approx(run.turns)
-    assert made.tightening[-1].turns == pytest.approx(run.turns)
-    assert all(row.saddle_gap == 0.0 for row in made.tightening)
+    assert made.tightening[-1]["nut_turns"] == pytest.approx(run.turns)
+    assert all(row["saddle_gap_mm"] == 0.0 for row in made.tightening)
 
 
 def test_a_bolted_clamp_cannot_straddle_two_wires_that_have_no_ends():

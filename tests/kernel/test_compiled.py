@@ -9,12 +9,16 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "clamp3d"
-PLAY = """
-from clamp3d.kernel.jit import entry, formula
+GAME = """
+from clamp3d.kernel.jit import formula
 
 @formula
 def play(R, r):
     return R - r
+"""
+PLAY = """
+from clamp3d.kernel.game import play
+from clamp3d.kernel.jit import entry
 
 @entry('float64(float64, float64)')
 def plays(R, r):
@@ -40,6 +44,7 @@ def copied(tmp_path):
     """A copy of the package with a kernel that is quick to compile."""
     shutil.copytree(PACKAGE, tmp_path / "clamp3d", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "clamp3d" / "kernel" / "play.py").write_text(PLAY)
+    (tmp_path / "clamp3d" / "kernel" / "game.py").write_text(GAME)
     return tmp_path
 
 
@@ -51,6 +56,9 @@ def test_a_kernel_is_compiled_once_and_says_so(copied):
     out, said = run(CALL, copied, NUMBA_CACHE_DIR=cache)
     assert (out, said.count("compiling the contact kernel, once for this machine")) == (["1.5"], 1)
     assert run(CALL, copied, NUMBA_CACHE_DIR=cache) == (["1.5"], "")
+    # A formula of another file than the kernel's own.
+    (copied / "clamp3d" / "kernel" / "game.py").write_text(GAME.replace("R - r", "R + r"))
+    assert run(CALL, copied, NUMBA_CACHE_DIR=cache)[0] == ["22.5"]
 
 
 def test_a_kernel_works_without_a_place_for_the_cache(copied):

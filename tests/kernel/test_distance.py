@@ -67,6 +67,18 @@ def test_batches_have_the_bits_of_single_poses(wire):
             signed_distances(groove, wire, axes)
 
 
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_an_axis_that_is_exactly_along_an_edge(axis):
+    """Beyond an end and beside it: lines that are parallel have no nearest point of their own."""
+    rng = np.random.default_rng(3)
+    groove, wire = SweptArc(8.0, 0.4, 16.0), Capsule(2.5, 3.0)
+    for centre in rng.uniform(-16.0, 16.0, (24, 3)):
+        answer = signed_distances(groove, wire, np.array([[centre, axis]]), full=True)
+        mp.mp.dps = 50
+        value = exact_distance(8.0, 0.4, 16.0, 2.5, 3.0, [mp.mpf(x) for x in centre], [mp.mpf(x) for x in axis])
+        assert abs(float(answer.distance[0] - mp.mpf(value))) < 1e-13, centre
+
+
 def test_witnesses_lie_on_both_surfaces_and_moving_by_the_distance_makes_them_touch():
     for case in CASES:
         a = signed_distance(case.groove, case.cylinder, case.pose)

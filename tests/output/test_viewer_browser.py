@@ -279,6 +279,21 @@ def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
 
 
+def assert_names_of_stops_are_apart(page):
+    marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
+    marks = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
+    assert marks
+    assert all(right <= left for (_, right), (left, _) in itertools.pairwise(marks))
+
+
+def test_names_of_stops_never_cover_each_other(saved):
+    page = saved(check(load(str(EXAMPLES / "pipe-clip" / "scene.toml"))))
+    for number in range(4):  # the first contact is just behind the beginning of its motion
+        go_to(page, number)
+        page.wait_for_timeout(100)
+        assert_names_of_stops_are_apart(page)
+
+
 def test_page_on_a_phone(saved, hinge):
     page = saved(hinge, **PHONE)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -292,9 +307,7 @@ def test_page_on_a_phone(saved, hinge):
     page.tap(".finding")
     page.wait_for_timeout(200)
     assert page.query_selector(".finding.now")
-    marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
-    marks = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
-    assert all(right <= left for (_, right), (left, _) in itertools.pairwise(marks))
+    assert_names_of_stops_are_apart(page)
 
 
 def test_page_in_dark_mode_is_dark_and_readable(saved, hinge):

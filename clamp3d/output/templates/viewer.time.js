@@ -64,11 +64,23 @@ function timeLine($, story, animator, ask, follow) {
       shown = is;
       for (const e of document.querySelectorAll(".stop")) e.hidden = Number(e.dataset.stop) !== is;
       [...$("marks").children].forEach((a, k) => { a.classList.toggle("now", k === i); });
+      uncover(i);
       if ($("now")) $("now").hidden = !moving;
       live = null;
       if (moving) say("Distances are listed at the stops; a page served by clamp3d view measures them all the way.");
     }
     if (moving && !asking && !(live && live.seconds === animator.time)) measureNow(animator.time);
+  }
+  // The name of the stop that is shown stands; of the others those that it and each other leave free.
+  function uncover(i) {
+    const marks = [...$("marks").children], free = [];
+    marks.forEach((a) => a.classList.remove("covered"));
+    for (const a of marks[i] ? [marks[i], ...marks] : marks) {
+      const box = a.getBoundingClientRect();
+      const covered = free.some(([b, other]) => a !== b && box.left < other.right && other.left < box.right);
+      a.classList.toggle("covered", covered);
+      if (!covered && a.textContent) free.push([a, box]);
+    }
   }
   async function measureNow(seconds) {
     asking = true;
