@@ -105,7 +105,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         distance = replace(distance, method=by_points.method) if np.isfinite(by_points.lower) else distance
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
-    return replace(distance, method=f"{distance.method}; way out by meshes (FCL)")
+    return replace(distance, method=f"{distance.method}; separating move by meshes (FCL)")
 
 
 def _depth_chord(model: Model, fine: bool) -> float:

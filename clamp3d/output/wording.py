@@ -45,10 +45,10 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
 
 
 def distance_text(*distances: Distance, digits: int = 6) -> str:
-    """`gap_text` of bounds that hold the distances; of pins in holes the interference, and how long the way out is.
+    """`gap_text` of bounds that hold the distances; of pins in holes the interference, and the move that ends it.
 
     >>> distance_text(Distance(-13.2, -0.03, interference=(0.03, 0.03)))
-    'interference 0.030000 mm, way out up to 13.2 mm'
+    'interference 0.030000 mm, apart after a move of up to 13.2 mm'
     >>> distance_text(Distance(-0.37, -0.37), Distance(-0.32, -0.32))
     'overlap 0.32 to 0.37 mm'
     """
@@ -57,12 +57,12 @@ def distance_text(*distances: Distance, digits: int = 6) -> str:
     if any(bound == (d.lower, d.upper) for bound, d in zip(bounds, distances, strict=True)):
         return text
     way = -min(distance.lower for distance in distances)
-    out = "" if math.isinf(way) else f", way out up to {_rounded(way, math.ceil)} mm"
+    out = "" if math.isinf(way) else f", apart after a move of up to {_rounded(way, math.ceil)} mm"
     return text.replace("overlap", "interference") + out
 
 
 def shown_bounds(distance: Distance) -> tuple[float, float]:
-    """Bounds of the signed distance, or of minus the interference where the way out is far longer."""
+    """Bounds of the signed distance, or of minus the interference where the move that separates is far longer."""
     inside = distance.interference
     if inside is not None and inside[0] > 0.0 and LONG * inside[1] < -distance.lower:
         return -inside[1], -inside[0]

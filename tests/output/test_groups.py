@@ -98,10 +98,10 @@ def test_a_pin_that_is_too_thick_is_told_by_how_much_not_by_its_way_out():
     result = check(scene)
     said = check_to_text(result)
     assert "1 clash, deepest 0.030000 mm (" in said
-    assert re.search(r"  ring and pin clash: interference 0\.030000 mm, way out up to 1\d\.?\d* mm; ", said)
+    assert re.search(r"  ring and pin clash: interference 0\.030000 mm, apart after a move of up to 1\d\S* mm; ", said)
     (row,) = result.pairs
     assert row.distance.interference == pytest.approx((0.03, 0.03), abs=1e-9)
-    assert row.distance.method == "groove kernel; way out by meshes (FCL)"
+    assert row.distance.method == "groove kernel; separating move by meshes (FCL)"
 
 
 def test_the_table_of_pairs_goes_by_groups():

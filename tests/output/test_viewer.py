@@ -271,7 +271,7 @@ def test_a_clean_clamp_has_notes_and_no_findings():
     with view("reference", serve=False) as viewer:
         assert viewer.story["findings"] == []
         page = viewer.html()
-    assert "Findings, worst first" not in page
+    assert "Findings, worst and rarest first" not in page
     assert page.count("but does not touch: 1.000 mm apart in the final state") >= 2
 
 
