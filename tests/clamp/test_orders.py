@@ -11,7 +11,7 @@ from orders import MOVING, has_way, open_bodies, possible, questions
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.ways import Insertion
+from clamp3d.clamp.ways import DIRECTIONS, Insertion, out
 from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SequenceError
 
@@ -46,3 +46,11 @@ def test_orders_that_brute_force_allows(truth):
     assert blocked not in allowed
     with pytest.raises(SequenceError):
         assemble(sequence=" -> ".join(blocked))
+
+
+def test_parts_come_along_the_axes_of_the_world():
+    sides = {"from above": (2, 1), "from below": (2, -1), "from the right": (0, 1), "from the left": (0, -1)}
+    sides |= {"from behind": (1, 1), "from the front": (1, -1)}
+    assert {name: out(name).tolist() for name in DIRECTIONS} == {
+        name: (sign * np.eye(3)[axis]).tolist() for name, (axis, sign) in sides.items()
+    }
