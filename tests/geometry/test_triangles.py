@@ -22,6 +22,8 @@ def test_nearest_points_of_triangles(triangles, points):
         theirs = np.linalg.norm(closest_point(triangles, points) - points, axis=1)
     area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     assert (away <= theirs + 1e-9).all()
+    small = np.linalg.norm(closest_points(1e-3 * triangles, 1e-3 * points) - 1e-3 * points, axis=1)
+    assert np.abs(1e3 * small - away).max() < 1e-9  # sides may be far shorter than a millimetre
     assert np.abs(away - theirs)[area > 1e-2].max(initial=0.0) < 1e-9
     for triangle, point in zip(triangles, found, strict=True):
         shares = scipy.optimize.nnls(np.vstack([triangle.T, np.full(3, 1e3)]), np.append(point, 1e3))
