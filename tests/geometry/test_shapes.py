@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from shapely import Polygon
 
 from clamp3d import distance
 from clamp3d.errors import InputError
 from clamp3d.geometry.profile import Profile
+from clamp3d.geometry.shells import volume
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import box, extrusion, mesh, sphere
 
@@ -64,3 +66,10 @@ def test_what_is_no_shape_is_refused_in_one_line(make, words):
     with pytest.raises(InputError, match=words) as error:
         make()
     assert "\n" not in str(error.value)
+
+
+def test_a_surface_that_is_flat_to_rounding_has_no_volume():
+    box = trimesh.creation.box((3.0, 4.0, 5.0))
+    flat = (box.vertices * (1.0, 1.0, 0.0)) @ rotation((1.0, 2.0, 3.0), 0.7)[:3, :3].T + (100.0, 200.0, 300.0)
+    assert volume(flat, box.faces) == 0.0
+    assert volume(box.vertices, box.faces) == pytest.approx(60.0)
