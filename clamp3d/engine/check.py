@@ -58,7 +58,7 @@ def check(
     depths : bool
         Measure the penetration depth of clashes, as `clamp3d.engine.distance.distance` does; without, "at least".
     progress : callable, optional
-        Is told (stage, done, of).
+        Called with (stage, done, of).
     on_row : callable, optional
         Is called with each row at rest: first with the verdict of every pair, then with the depth of each clash, the
         deepest overlap that is certain first.
@@ -140,7 +140,7 @@ class _Log:
 
 
 def _ignore(*_: object) -> None:
-    """What is told to nobody."""
+    """Progress and rows that nobody follows."""
 
 
 def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:

@@ -94,6 +94,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     depth = max(interference[0], attested)
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, depth)
+    method = distance.method
     hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it exactly
     if length > LONG * (depth + hidden) and a.exact is not None and b.exact is not None:
         from clamp3d.engine.exact import exact_overlap
@@ -102,16 +103,22 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         by_points = exact_overlap(a, b, T, SHARES[0])
         depth, interference = max(depth, -by_points.upper), (depth, min(interference[1], -by_points.lower))
         upper = min(upper, -depth)
-        distance = replace(distance, method=by_points.method) if np.isfinite(by_points.lower) else distance
+        method = by_points.method if np.isfinite(by_points.lower) else method
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
-    distance = replace(distance, lower=min(-length, upper), upper=upper, interference=interference, normal=direction)
-    return replace(distance, method=f"{distance.method}; separating move by meshes (FCL)")
+    return replace(
+        distance,
+        lower=min(-length, upper),
+        upper=upper,
+        interference=interference,
+        normal=direction,
+        method=f"{method}; separating move by meshes (FCL)",
+    )
 
 
 def _depth_chord(model: Model, fine: bool) -> float:
     """Chord error (mm) of the mesh that the depth of a part is measured on."""
     finest = model.chords[min(1, len(model.chords) - 1)]
-    return max(finest, QUICK_CHORD) if model.exact and not fine and model.refines else finest
+    return finest if fine or model.exact is None else max(finest, QUICK_CHORD)
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:

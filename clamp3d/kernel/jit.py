@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,6 +28,9 @@ _SOURCES = (
 )
 _CONFIG: Any = numba.config  # its names come from the environment
 _NUMBA_FOLDER = _CONFIG.CACHE_DIR
+# Named by all sources: numba itself watches only the file that a kernel stands in.
+_DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _SOURCES)).hexdigest()
+_CACHE_FOLDER = str(Path(_NUMBA_FOLDER or _FOLDER / "__pycache__") / f"kernel-{_DIGEST[:16]}")
 
 
 def formula(function: _F) -> _F:
@@ -42,12 +45,6 @@ def inlined(function: _F) -> _F:
     return compiled
 
 
-def cache_folder(sources: Sequence[Path]) -> str:
-    """Where kernels made from these sources are kept: numba itself watches the file alone that a kernel stands in."""
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
-    return str(Path(_NUMBA_FOLDER or Path(__file__).parent / "__pycache__") / f"kernel-{digest[:16]}")
-
-
 def entry(signature: Any) -> Callable[[_F], _F]:
     """Decorator of a kernel that Python calls with arguments of these types alone.
 
@@ -57,7 +54,7 @@ def entry(signature: Any) -> Callable[[_F], _F]:
 
     def decorate(function: _F) -> Any:
         notice = _Notice()
-        _CONFIG.CACHE_DIR = cache_folder(_SOURCES)
+        _CONFIG.CACHE_DIR = _CACHE_FOLDER
         with event.install_listener("numba:compile", notice):
             try:
                 return numba.njit(signature, cache=True, **_OPTIONS)(function)

@@ -130,8 +130,8 @@ class SceneDrawing:
         self._label(f"{ROOT}/caption", caption, [*(0.5 * (low + high))[:2], low[2] - 0.05 * self.size], "#FFFFFF", 0.8)
         self._go(0)
         if len(self.timeline.stops) > 1:
-            # A meshcat server tells a page that comes later node by node: at the root the animation would be the first,
-            # and the transforms after it would take the parts back to the start of what already plays.
+            # A meshcat server sends the scene node by node to a page that connects later: at the root the animation
+            # would be first, and the transforms after it would take the parts back to the start of what already plays.
             animation = self.timeline.animation(ROOT.lstrip("/"), self.paths, _MARKS)
             self._send(SetAnimation(animation).lower() | {"path": f"{ROOT}/animation"})
 
@@ -153,7 +153,7 @@ class SceneDrawing:
         return {"low": low.tolist(), "high": high.tolist(), "eye": self._eye.tolist()}
 
     def with_margin(self, finding: dict[str, Any]) -> dict[str, Any]:
-        """A finding of the page with some room around its place: the common part, else the nearest points."""
+        """A finding with a margin around the box that the camera frames: the common part, else the nearest points."""
         place = (finding["stop"], finding["a"], finding["b"])
         low, high = self._shared.get(place, (finding["low"], finding["high"]))
         margin = 0.1 * self.size
@@ -215,7 +215,8 @@ class SceneDrawing:
             return
         margin = 0.01 * self.size
         self._put(f"{path}/box", draw.box(low - margin, high + margin, red))
-        self._label(f"{path}/value", row.gap.partition(",")[0], high + margin, "#FFFFFF", 0.7)
+        depth = row.gap.partition(",")[0]  # without the move that separates: a label has one number
+        self._label(f"{path}/value", depth, high + margin, "#FFFFFF", 0.7)
 
     def _dot(self, path: str, point: Array, colour: str) -> None:
         T = np.eye(4)

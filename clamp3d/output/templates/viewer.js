@@ -46,7 +46,7 @@ function clamp3dViewer(messages, done) {
   const names = () => Object.keys(story.paths);
   const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
   const soft = () => (calm() ? 0 : 700);
-  // How pairs stand at a moment of the time line: the program measures when it is asked. Null on a saved page.
+  // Distances of pairs at a time of the time line, measured by the program on request. Null on a saved page.
   const ask = async (query) => {
     if (!served || !story.done) return null;
     try {
