@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import fcl
-import igl
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
@@ -31,6 +30,7 @@ from clamp3d.engine.surface import fcl_tree
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Cylinder
+from clamp3d.geometry.shells import winding_numbers
 
 UNIT = 16384.0
 """FCL units per mm. See the module."""
@@ -153,7 +153,7 @@ def contained(shape: Shape, wire: Wire) -> bool:
     if shape.kind != "mesh" or wire.cylinder.length > shape.solid.scale:
         return False
     middle = wire.T[:3, 3]
-    return bool(igl.winding_number(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
+    return bool(winding_numbers(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
 
 
 def _nearest(shape: Shape, wire: Wire) -> Measurement:

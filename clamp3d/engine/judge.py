@@ -84,7 +84,7 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     if slack <= contact or inner.exact is None or outer.exact is None:
         return True
     # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
-    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T, 1.0)
+    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T)
     return shared.volume >= inner.exact.volume - contact * shared.area
 
 

@@ -104,11 +104,15 @@ def _nothing(_: Distance) -> bool:
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:
     """Whether the true bodies of two meshes certainly do not overlap, ``b`` at ``T`` (4, 4) in a's frame."""
+    import fcl
+
     rounding = rounding_of(a, b, T)
     if surfaces_meet(a, b, T):
         return False
-    lower, upper, _, _ = nearest_points(a, b, T)
-    return lower >= rounding and upper > rounding and not (one_inside(a, b, T) or one_inside(b, a, inverse(T)))
+    gap = float(fcl.distance(*fcl_pair(a.bvh, b.bvh, T), fcl.DistanceRequest(), fcl.DistanceResult()))
+    if gap <= rounding or (gap < a.error + b.error + rounding and nearest_points(a, b, T)[0] < rounding):
+        return False
+    return not (one_inside(a, b, T) or one_inside(b, a, inverse(T)))
 
 
 def one_inside(outer: Surface, inner: Surface, T: Array) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from clamp3d.engine.hull import hull_error
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shells import shells
+from clamp3d.geometry.shells import shells, winding_numbers
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -135,9 +135,7 @@ class Surface:
         near = np.ascontiguousarray(points[rows], dtype=np.float64)
         behind, is_certain = self._behind_nearest(near)
         if not is_certain.all():
-            import igl
-
-            turns = igl.winding_number(self.vertices, self.faces, near[~is_certain])
+            turns = winding_numbers(self.vertices, self.faces, near[~is_certain])
             behind[~is_certain] = np.abs(turns) > 0.5
         inside[rows] = behind
         return np.asarray(inside)

@@ -107,7 +107,7 @@ class Locator:
         from clamp3d.files.cad_process import common as exact_common
 
         try:
-            shared = exact_common(self.a.exact.brep, self.b.exact.brep, self.T_ab, 0.1)
+            shared = exact_common(self.a.exact.brep, self.b.exact.brep, self.T_ab)
         except Clamp3dError:
             return None
         if not shared.volume > 0.0:

@@ -27,7 +27,7 @@ _SAMPLES = 500
 class CommonPart:
     """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
 
-    ``points`` (n, 3) lie on its border, which is within ``chord`` mm of triangles between them.
+    ``points`` (n, 3), if any, lie on its border, which is within ``chord`` mm of triangles between them.
     """
 
     volume: float
@@ -49,11 +49,11 @@ def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
     return float(search.Value()), p, q
 
 
-def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
+def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPart:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4).
 
-    Its border is meshed with chords that are ``share`` of its thickness, volume over area, or of its size divided by
-    `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
+    With ``share`` its border is meshed, with chords that are ``share`` of its thickness, volume over area, or of its
+    size divided by `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
     """
     operation = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
     if not operation.IsDone():
@@ -62,6 +62,8 @@ def common(a: bytes, b: bytes, T: Array, share: float) -> CommonPart:
     if next(explore(shape, "SOLID"), None) is None:
         return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
+    if share is None:
+        return CommonPart(volume, area, box, np.empty((0, 3)), 0.0)
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
     occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
     samples = [_samples(face, k) for k, face in enumerate(explore(shape, "FACE"))]

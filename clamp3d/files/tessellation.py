@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -114,19 +113,25 @@ def _middles(corners: Array) -> Array:
 
 def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
-    from scipy.sparse import dok_array  # the process that asks for triangles needs none of it
-
     triangulation = occ.BRep_Tool.Triangulation_s(face, place := occ.TopLoc_Location())
-    sags = dok_array((len(points), len(points)))
+    sag_of: dict[int, float] = {}
     for edge in explore(face, "EDGE"):
         polygon, curve = occ.BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place), None
         if polygon is not None and not occ.BRep_Tool.Degenerated_s(edge):
             curve = occ.BRepAdaptor_Curve(edge)
         if curve is None or curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line:
             continue
-        nodes = range(1, polygon.NbNodes() + 1)
-        for i, j in pairwise(nodes):
-            a, b = polygon.Node(i) - 1, polygon.Node(j) - 1
-            true = curve.Value(0.5 * (polygon.Parameter(i) + polygon.Parameter(j))).Coord()
-            sags[a, b] = sags[b, a] = SAMPLED * np.linalg.norm(true - 0.5 * (points[a] + points[b]))
-    return np.asarray(sags.tocsr()[triangles, np.roll(triangles, -1, axis=1)].toarray().max(axis=1))
+        count = range(1, polygon.NbNodes() + 1)
+        nodes, at = np.array([polygon.Node(i) - 1 for i in count]), np.array([polygon.Parameter(i) for i in count])
+        true = np.array([curve.Value(t).Coord() for t in (0.5 * (at[:-1] + at[1:])).tolist()])
+        sags = SAMPLED * np.linalg.norm(true - 0.5 * (points[nodes[:-1]] + points[nodes[1:]]), axis=1)
+        sag_of.update(zip(_edge_keys(nodes[:-1], nodes[1:]).tolist(), sags.tolist(), strict=True))
+    keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
+    errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))
+    errors[on_border] = [sag_of[key] for key in keys[on_border].tolist()]
+    return np.asarray(errors.max(axis=1))
+
+
+def _edge_keys(a: IntArray, b: IntArray) -> IntArray:
+    """A number for each edge between vertices ``a`` and ``b``, the same in both directions."""
+    return np.asarray((np.minimum(a, b).astype(np.int64) << 32) + np.maximum(a, b))
