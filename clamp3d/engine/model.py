@@ -34,8 +34,8 @@ Progress = Callable[[str, int, int], None]
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
-_MOST_COARSE = 3000
-"""Triangles of the coarse mesh of a solid from CAD beyond which the fine one costs more than asking Open CASCADE."""
+_MOST_FINE = 60_000
+"""Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
@@ -210,12 +210,14 @@ class CadModel(Model):
     def chords(self) -> tuple[float, ...]:
         """The chord errors (mm) of its meshes; none if Open CASCADE's triangles do not close: then it is asked."""
         try:
-            faces = self.shape.tessellated(CAD_CHORDS[0]).faces
+            coarse = self.shape.tessellated(CAD_CHORDS[0])
         except Clamp3dError:
             return ()
-        if not is_closed(faces):
+        if not is_closed(coarse.faces):
             return ()
-        return CAD_CHORDS if len(faces) <= _MOST_COARSE else CAD_CHORDS[:1]
+        # On a face that bends both ways a triangle's error is as its area.
+        fine = float(np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0).sum())
+        return CAD_CHORDS if fine <= _MOST_FINE else CAD_CHORDS[:1]
 
     @cached_property
     def bodies(self) -> Forms | None:
