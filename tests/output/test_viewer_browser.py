@@ -11,7 +11,6 @@ import os
 import re
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +31,6 @@ from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.serving import PageServer
 from clamp3d.output.viewer import Viewer, check_to_html, view
 from clamp3d.output.viewer_story import ClampStory
-from clamp3d.scenefile.load import load
 
 playwright_api = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need playwright: pip install 'clamp3d[dev]'"
@@ -41,7 +39,6 @@ Image = pytest.importorskip("PIL.Image")
 
 SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 ARGUMENTS = ["--no-sandbox", *SOFTWARE]
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CUT = {"P1": (110.0, 8.0), "P2": (-58.0, 30.0), "P3": (-16.5, 57.0), "P6": (-9.0, 0.0), "P7": (-4.5, 0.0)}
 """Points (u, v) of cut faces that no label, contact or other part covers in the final state."""
 
@@ -78,7 +75,7 @@ def saved(browser, tmp_path_factory):
     def save(shown, fragment="", **options):
         if id(shown) not in files:
             path = tmp_path_factory.mktemp("page") / "page.html"
-            view(shown, serve=False).save_html(path)
+            view(shown, serve=False, mesh_error=0.1).save_html(path)
             files[id(shown)] = path, shown
         page = open_page(browser, files[id(shown)][0].as_uri() + fragment, offline=True, **options)
         wait_for(page, "document.querySelector('.part')")
@@ -94,13 +91,23 @@ def saved(browser, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hinge():
-    """The check of the hinge with its pin out of place: a clash at rest, and one in a motion."""
-    return check(load(str(EXAMPLES / "hinge" / "scene.toml")).moved({"pin": translation(0.4, 0.0, 0.0)}))
+    """A pin 1 mm in leaf-a, and leaf-b that passes over leaf-a through its top and back: a clash just as it sets out."""
+    scene = Scene(name="hinge", clearance=2.5).add("leaf-a", shapes.box((20, 20, 20)))
+    scene = scene.add("leaf-b", shapes.box((6, 6, 6)), translation(24, 0, 15))
+    scene = scene.add("pin", shapes.cylinder(3, 30), translation(12, 0, 0))
+    ways = (Motion.translate((way, 0, 0), parts="leaf-b", name=name) for name, way in (("fold", -18.3), ("back", 18.3)))
+    return check(replace(scene, motions=tuple(ways)))
 
 
 @pytest.fixture(scope="module")
 def hinge_page(saved, hinge):
-    return saved(hinge)
+    return saved(hinge, viewport={"width": 1200, "height": 700})
+
+
+@pytest.fixture(scope="module")
+def dark_phone(saved, hinge):
+    size = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
+    return saved(hinge, color_scheme="dark", **size)
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +125,7 @@ def sliding():
 
 
 def open_page(browser, url, *, offline=False, **options):
-    options = {"viewport": {"width": 1200, "height": 700}, "reduced_motion": "reduce"} | options
+    options = {"viewport": {"width": 900, "height": 560}, "reduced_motion": "reduce"} | options
     page = browser.new_context(offline=offline, **options).new_page()
     page.problems = []
     page.on("pageerror", lambda error: page.problems.append(str(error)))
@@ -150,7 +157,7 @@ def visible(page, *path):
 
 
 def pixels(page):
-    page.evaluate("viewer.render()")
+    page.evaluate("window.viewer?.render()")
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
 
 
@@ -276,9 +283,6 @@ def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
     assert not page.evaluate("viewer.animator.playing")
 
 
-PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
-
-
 def assert_names_of_stops_are_apart(page):
     marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
     marks = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
@@ -286,16 +290,14 @@ def assert_names_of_stops_are_apart(page):
     assert all(right <= left for (_, right), (left, _) in itertools.pairwise(marks))
 
 
-def test_names_of_stops_never_cover_each_other(saved):
-    page = saved(check(load(str(EXAMPLES / "pipe-clip" / "scene.toml"))))
-    for number in range(4):  # the first contact is just behind the beginning of its motion
-        go_to(page, number)
-        page.wait_for_timeout(100)
-        assert_names_of_stops_are_apart(page)
+def test_names_of_stops_never_cover_each_other(hinge_page):
+    for number in range(5):
+        go_to(hinge_page, number)
+        assert_names_of_stops_are_apart(hinge_page)
 
 
-def test_page_on_a_phone(saved, hinge):
-    page = saved(hinge, **PHONE)
+def test_page_on_a_phone(dark_phone):
+    page = dark_phone
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     pane = page.query_selector("#meshcat-pane").bounding_box()
     assert pane["width"] == 390
@@ -310,8 +312,8 @@ def test_page_on_a_phone(saved, hinge):
     assert_names_of_stops_are_apart(page)
 
 
-def test_page_in_dark_mode_is_dark_and_readable(saved, hinge):
-    page = saved(hinge, color_scheme="dark")
+def test_page_in_dark_mode_is_dark_and_readable(dark_phone):
+    page = dark_phone
     page.keyboard.press("h")
     page.wait_for_timeout(300)
     image = pixels(page)
@@ -345,7 +347,7 @@ def test_page_of_a_fit_follows_the_scheme(browser, tmp_path):
         page.emulate_media(color_scheme=scheme)
         page.reload()
         page.wait_for_timeout(300)
-        image = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
+        image = pixels(page)
         for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
             assert image[y, x].min() > 200 if scheme == "light" else image[y, x].max() < 70
         for selector in ("h1", "p", "td", "th", "dd", ".pm"):
@@ -506,7 +508,7 @@ def test_two_clicks_measure_also_on_a_cut(two_boxes):
         wait_for(page, "document.getElementById('measured').textContent.includes('the parts')")
         words = page.inner_text("#measured")
         found = re.fullmatch(
-            r"left to right: ([\d.]+) mm between the points, within 0.02 mm \(X ([\d.]+), Y (.*), Z ([\d.]+)\); "
+            r"left to right: ([\d.]+) mm between the points, within 0.20 mm \(X ([\d.]+), Y (.*), Z ([\d.]+)\); "
             r"the parts: gap 20.0000 mm",
             words,
         )
