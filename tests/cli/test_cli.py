@@ -5,7 +5,6 @@ import math
 import warnings
 
 import click
-import numpy as np
 import pytest
 import trimesh
 
@@ -160,10 +159,24 @@ def test_numbers_may_be_fractions_and_nothing_else(text, value):
             number(text)
 
 
-def test_a_third_of_a_millimetre_is_the_papers_step(main):
-    found = json.loads(main("run", "-q", "--step", "1/3", "--json", "-")[1])
-    assert found["solver"] == "stepped"
-    assert np.round(found["distance_mm"], 3) == 31.530
+@pytest.mark.parametrize(
+    ("arguments", "solver", "distance"),
+    [
+        ("--step 1/3", "stepped", 31.530),
+        ("--method chords --unit-angle-deg 20", "exact", 32.080),
+        ("--line LJ-500", "exact", 27.233),
+    ],
+)
+def test_methods_steps_and_wires_are_those_asked_for(arguments, solver, distance, main):
+    found = json.loads(main("run", "-q", *arguments.split(), "--json", "-")[1])
+    assert found["solver"] == solver
+    assert round(found["distance_mm"], 3) == distance
+
+
+def test_conductors_have_the_diameters_of_their_standards(main):
+    rows = dict(line.split()[:2] for line in main("conductors")[1].splitlines())
+    diameters = {"LJ-16": "5.10", "LJ-120": "14.25", "LJ-500": "29.12", "LJ-630": "32.67", "LGJ-10/2": "4.50"}
+    assert diameters.items() <= rows.items()
 
 
 def test_a_warning_is_one_line_on_stderr(monkeypatch, main):

@@ -91,7 +91,7 @@ def saved(browser, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hinge():
-    """A pin 1 mm in leaf-a, and leaf-b that passes over leaf-a through its top and back: a clash just as it sets out."""
+    """A pin 1 mm in leaf-a; leaf-b goes through the pin's top and back, over leaf-a: a clash as it sets out again."""
     scene = Scene(name="hinge", clearance=2.5).add("leaf-a", shapes.box((20, 20, 20)))
     scene = scene.add("leaf-b", shapes.box((6, 6, 6)), translation(24, 0, 15))
     scene = scene.add("pin", shapes.cylinder(3, 30), translation(12, 0, 0))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d import Scene, check, check_poses, distance, distances
+from clamp3d import Scene, check, distance
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
 
@@ -95,30 +95,6 @@ def test_depths_of_bodies_that_overlap(case):
     if measured.normal is not None and math.isfinite(measured.lower):
         way = translation(*(-(measured.lower - 1e-6) * measured.normal))
         assert distance(a, b, way @ T).lower >= -1e-6
-
-
-@pytest.mark.parametrize("case", ["a pin in a tube", "a wire in its groove", "crossed cylinders", "faces of boxes"])
-def test_many_poses_are_measured_as_each_of_them(case):
-    a, b, T, _ = APART[case]
-    rng = np.random.default_rng(0)
-    poses = np.array([translation(*rng.uniform(-0.05, 0.05, 3)) @ T for _ in range(12)])
-    batch = distances(a, b, poses)
-    for k, pose in enumerate(poses):
-        one = distance(a, b, pose)
-        assert batch.lower[k] <= one.upper + 1e-9
-        assert one.lower <= batch.upper[k] + 1e-9
-        assert (batch.upper[k] < 0.0) == (one.upper < 0.0)
-
-
-def test_verdicts_at_many_poses():
-    ways = np.array([0.0, 0.04, 0.0549, 0.0551, 0.0749, 0.0751, 0.2])  # 0.065 mm of clearance, contact within 0.01
-    scene = Scene(clearance=0.02).add("block", BLOCK).add("wire", WIRE)
-    swept = check_poses(scene, "wire", np.array([translation(0, -way, 0) for way in ways]))
-    expected = ["clear", "clear", "clearance", "contact", "contact", "clash", "clash"]
-    assert swept.verdict[:, 0].tolist() == expected
-    for way, verdict in zip(ways, expected, strict=True):
-        row = check(scene.moved({"wire": translation(0, -way, 0)})).pairs
-        assert (row[0].verdict.value if row else "clear") == verdict
 
 
 def test_a_wire_at_the_edge_of_contact_is_decided():

@@ -1,4 +1,4 @@
-"""Meshes made by trimesh against manifold3d, python-fcl and formulas within the stated facets."""
+"""Meshes made by trimesh against manifold3d, and what is certain of open ones."""
 
 import itertools
 
@@ -30,11 +30,6 @@ def manifold(mesh, T=None):
     return manifold3d.Manifold(raw)
 
 
-def sagitta(mesh, radius):
-    """How far the facets of a ball of ``radius`` lie inside it, mm."""
-    return radius - np.abs((mesh.triangles[:, 0] * mesh.face_normals).sum(axis=1)).min()
-
-
 def placed(rng, reach):
     T = rotation(rng.normal(size=3), rng.uniform(0, 3))
     way = rng.normal(size=3)
@@ -42,7 +37,7 @@ def placed(rng, reach):
     return T
 
 
-@pytest.mark.parametrize(("a", "b"), itertools.combinations_with_replacement(MADE, 2))
+@pytest.mark.parametrize(("a", "b"), [*itertools.combinations_with_replacement(MADE, 2)])
 def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
     rng = np.random.default_rng(0)
     for reach in (9.0, 14.0, 22.0):
@@ -61,55 +56,12 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
             assert measured.upper - measured.lower < 1e-4
 
 
-@pytest.mark.parametrize("gap", [3.0, 0.4, 0.05, -0.3, -2.0])
-def test_two_balls_are_as_far_apart_as_spheres_within_their_facets(gap):
-    r, s = 10.0, 4.0
-    one, two = trimesh.creation.icosphere(4, r), trimesh.creation.icosphere(3, s)
-    chords = sagitta(one, r) + sagitta(two, s)
-    T = placed(np.random.default_rng(1), r + s + gap)
-    measured = distance(as_shape(one), as_shape(two), T)
-    assert measured.lower <= gap + chords
-    assert measured.upper >= gap
-    if gap > 0.0:
-        assert measured.upper <= gap + chords + 1e-6
-        assert measured.lower >= gap - 1e-4
-    elif gap < -chords:
-        assert measured.upper < 0.0
-
-
-@pytest.mark.parametrize(
-    ("gap", "expected"), [(0.02, "clear"), (0.009, "contact"), (0.0, "contact"), (-0.009, "contact"), (-0.02, "clash")]
-)
-@pytest.mark.parametrize("format", ["stl", "glb"])
-def test_boxes_in_files_face_to_face(gap, expected, format, tmp_path):
-    scene = trimesh.Scene()
-    scene.add_geometry(MADE["box"], node_name="under", geom_name="under", transform=SKEW)
-    scene.add_geometry(MADE["box"], node_name="over", geom_name="over", transform=SKEW @ translation(1, 2, 8 + gap))
-    if format == "glb":
-        scene.apply_transform(rotation((1, 0, 0), -np.pi / 2)).export(tmp_path / "boxes.glb")
-        loaded = load(tmp_path / "boxes.glb", unit="mm")
-    else:
-        for name, mesh in zip(("under", "over"), scene.dump(), strict=True):
-            mesh.export(tmp_path / f"{name}.stl")
-        loaded = load(tmp_path)
-    assert {part.name for part in loaded.parts} == {"under", "over"}
-    result = check(loaded)
-    assert result.verdict("under", "over").value == expected
-    assert result.clean == (expected != "clash")
-
-
 @pytest.mark.parametrize("name", MADE)
 @pytest.mark.parametrize("offset", [0.0, 0.005])
 def test_one_mesh_twice_is_an_overlap(name, offset):
     shape = as_shape(MADE[name])
     scene = Scene().add("a", shape, SKEW).add("b", shape, translation(offset, 0, 0) @ SKEW)
     assert check(scene).verdict("a", "b").value in ("duplicate", "contained", "clash")
-
-
-@pytest.mark.parametrize("outer", ["icosphere", "box"])
-def test_what_is_inside_a_closed_mesh_is_contained(outer):
-    scene = Scene().add("outer", as_shape(MADE[outer])).add("inner", as_shape(trimesh.creation.box((2, 2, 2))), SKEW)
-    assert check(scene).verdict("outer", "inner").value in ("contained", "clash")
 
 
 def opened(mesh):
@@ -130,7 +82,7 @@ def test_a_stated_chord_widens_the_bounds(tmp_path):
     ball = trimesh.creation.icosphere(3, 10.0)
     for name, x in (("a", 0.0), ("b", 20.3)):
         ball.copy().apply_translation((x, 0, 0)).export(tmp_path / f"{name}.stl")
-    chord = sagitta(ball, 10.0)
+    chord = 10.0 - np.abs((ball.triangles[:, 0] * ball.face_normals).sum(axis=1)).min()  # how far facets are inside
     row = check(load(tmp_path, chord=chord), distances=True).pairs[0]
     assert row.distance.lower <= 0.3 <= row.distance.upper
     assert row.distance.upper - row.distance.lower >= 2 * chord

@@ -11,7 +11,7 @@ from tests.public.placed_pairs import FAMILIES, SOLIDS, PlacedPair, duplicate, j
 
 GAPS = ((0.0103, -0.03), (-5e-3, 0.0103))
 """Gaps of every other family, mm: scripts/check-placed asks for many more."""
-SLOW = {"ring_in_groove", "ball_in_ring", "thread_in_tube", "ball_in_socket", "spline_in_bore"}
+SLOW = {"ring_in_groove", "ball_in_ring", "thread_in_tube", "ball_in_socket", "spline_in_bore", "balls"}
 """Families of round or free-form faces: one gap."""
 
 

@@ -3,7 +3,6 @@
 import json
 import pickle
 
-import numpy as np
 import pytest
 import trimesh
 
@@ -19,16 +18,15 @@ def boxes(tmp_path):
     scene = trimesh.Scene()
     scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="a", geom_name="a")
     scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="b", geom_name="b", transform=T)
-    clamp3d.export(
-        clamp3d.Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), T), tmp_path / "two.glb"
-    )
     box = shapes.box(10, 10, 10)
+    drawn = clamp3d.Scene().add("a", box).add("b", box, T)
+    clamp3d.export(drawn, tmp_path / "two.glb")
     return {
         "path": tmp_path / "two.glb",
         "list": [("a", box), ("b", box, T)],
         "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), T)],
         "trimesh": scene,
-        "scene": clamp3d.Scene().add("a", box).add("b", box, T),
+        "scene": drawn,
     }
 
 
@@ -46,12 +44,6 @@ def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path):
     assert page.exists()
     (written,) = clamp3d.export(source, tmp_path / "out.stl").files
     assert trimesh.load(written).volume == pytest.approx(2000.0, rel=1e-6)
-
-
-def test_a_clamp_is_assembled_first(tmp_path):
-    assert clamp3d.check("reference").counts == clamp3d.check(clamp3d.assemble()).counts == {"allowed": 8, "clear": 13}
-    with clamp3d.view("reference", serve=False) as viewer:
-        assert viewer.story["headline"] == "clamped"
 
 
 @pytest.mark.parametrize(
@@ -81,6 +73,3 @@ def test_results_can_be_pickled(boxes):
     assert again.to_dict() == result.to_dict()
     assembly = clamp3d.assemble()
     assert pickle.loads(pickle.dumps(assembly)).distance == assembly.distance
-    np.testing.assert_array_equal(
-        pickle.loads(pickle.dumps(result.findings[0])).distance.point_a, result.findings[0].distance.point_a
-    )
