@@ -18,13 +18,14 @@ import pytest
 import clamp3d.output.viewer
 from clamp3d.clamp.assemble import assemble
 from clamp3d.engine.check import check
+from clamp3d.engine.distance import measure
 from clamp3d.engine.scene import Scene
 from clamp3d.fit.fit import fit_mesh
 from clamp3d.geometry import shapes
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import translation
+from clamp3d.geometry.pose import nearest_rigid, translation
 from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS
@@ -406,8 +407,11 @@ def test_served_page_follows_the_run_and_measures_between_the_stops(browser, run
         page.wait_for_timeout(500)  # what was measured while it played comes first
         cells = "[...document.querySelectorAll('#now tr')].map((tr) => [1, 2].map((k) => tr.cells[k].textContent))"
         shown = dict(page.evaluate(cells))
+        poses = {name: pose_in_browser(page, ["parts", name]) for name in run.poses}  # three.js has single precision
+        truth = measure(run.scene.moved({name: nearest_rigid(T[None])[0] for name, T in poses.items()}))
         for row in viewer.answer({"time": str(seconds)})["rows"]:
             assert shown[f"{row['a']}\u2013{row['b']}"] == row["gap"]
+            assert row["distance_mm"] == pytest.approx(truth[row["a"], row["b"]].upper, abs=1e-3)
         go_to(page, len(run.path) - 1)
         assert_drawn(page, run.poses)
     page.wait_for_timeout(500)
