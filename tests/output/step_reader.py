@@ -15,6 +15,8 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
+from tests.cad import matrix
+
 
 class Leaf:
     """A part of a product tree.
@@ -27,8 +29,7 @@ class Leaf:
         self.name, self.path, self.colour = name, path, colour or colour_of(label)
         shape = XCAFDoc_ShapeTool.GetShape_s(label)
         self.shape, self.solid, self.volume = shape.Moved(place), shape.TShape(), volume(shape)
-        M = place.Transformation()
-        self.T = np.array([[M.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+        self.T = matrix(place)[:3]
         self.face_colours = sorted(filter(None, map(colour_of, children(label))))
 
 

@@ -13,7 +13,7 @@ from clamp3d.output.report_page import report_csv, report_to_dict
 from clamp3d.output.scene_report import check_to_dict
 from clamp3d.output.viewer import view
 
-WIRES = [(None, None), ("LJ-500", "LJ-120"), ("40", "12.5"), ("LGJ-240/40", "LGJ-95/15")]
+WIRES = [(None, None), ("LGJ-240/40", "12.5")]
 
 
 @pytest.mark.parametrize(("line", "jumper"), WIRES)
