@@ -11,11 +11,12 @@ import pytest
 
 BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
 COMMAND = [sys.executable, "-m", "clamp3d"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
 
 
 def clamp3d(*arguments, env=None, **kwargs):
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **(env or {})}
+    env = ENVIRONMENT | (env or {})
     return subprocess.run([*COMMAND, *arguments], capture_output=True, timeout=120, check=False, env=env, **kwargs)
 
 
@@ -91,14 +92,12 @@ class TestStreams:
     @pytest.mark.parametrize("arguments", [("--help",), ("check", "a.toml")])
     def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, tmp_path):
         (tmp_path / "a.toml").write_text(BOX.format(name="a", x=0.0) + BOX.format(name="b", x=9.0))
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         with open("/dev/full", "w") as full:
-            done = subprocess.run(
-                [*COMMAND, *arguments], stdout=full, stderr=subprocess.PIPE, check=False, cwd=tmp_path, env=env
-            )
+            streams = {"stdout": full, "stderr": subprocess.PIPE}
+            done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
             assert done.returncode == 2
             assert done.stderr.count(b"error") == done.stderr.count(b"No space left on device") == 1
-            silent = subprocess.run([*COMMAND, "check", "none.toml"], stderr=full, check=False, env=env)
+            silent = subprocess.run([*COMMAND, "check", "none.toml"], stderr=full, check=False, env=ENVIRONMENT)
         assert silent.returncode == 2
 
 
@@ -108,8 +107,7 @@ class TestEnd:
         """The decomposition of a splint takes tens of seconds in a process of its own."""
         temporary = tmp_path / "tmp"
         temporary.mkdir()
-        env = {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **env}
+        env = ENVIRONMENT | {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
         with subprocess.Popen(
             [*COMMAND, "run", "-q", "--method", "hulls"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env
         ) as process:

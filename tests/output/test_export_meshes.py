@@ -113,7 +113,7 @@ def test_obj_has_named_coloured_objects(odd_scene: Scene, tmp_path: Path) -> Non
         assert f"newmtl {name}_" in materials.read_text()
 
 
-def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path) -> None:
+def test_3mf_by_lib3mf(odd_scene: Scene, tmp_path: Path) -> None:
     lib3mf = pytest.importorskip("lib3mf", reason="lib3mf is not installed")
     written = export(odd_scene, tmp_path, format="3mf", mesh_error=MESH_ERROR)
     model = lib3mf.get_wrapper().CreateModel()
@@ -128,9 +128,6 @@ def test_3mf_by_lib3mf(reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_
         item = meshes.GetCurrentMeshObject()
         assert item.IsManifoldAndOriented()
         names.append(item.GetName())
-        box = item.GetOutbox()
-        seen = [list(box.MinCoordinate), list(box.MaxCoordinate)]
-        np.testing.assert_allclose(seen, parts(reference)[names[-1][:2]].bounds, atol=1e-3)  # six digits of the pose
     assert names == [f"{n} {TITLES[n]}" for n in PARTS]
     trees = model.GetComponentsObjects()
     assert trees.MoveNext()

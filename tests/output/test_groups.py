@@ -5,11 +5,8 @@ import io
 import json
 import random
 import re
-import zipfile
 from dataclasses import replace
-from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 from clamp3d.engine.check import check
@@ -211,27 +208,3 @@ def test_bad_baselines_and_identifiers_are_one_line(arguments, files, message, t
     code, out, err = main(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
-
-
-def test_bcf_has_a_topic_with_parts_camera_and_picture_for_each_group(tmp_path, main):
-    (tmp_path / "boxes.toml").write_text("".join(BOX.format(name=n, x=x) for n, x in {"a": 0, "b": 9, "c": 19}.items()))
-    code, _, err = main("check", tmp_path / "boxes.toml", "--bcf", tmp_path / "out.bcfzip", "-q")
-    assert (code, err) == (1, "")
-    with zipfile.ZipFile(tmp_path / "out.bcfzip") as package:
-        files = {name: package.read(name) for name in package.namelist()}
-    topics = {name.split("/")[0] for name in files if "/" in name}
-    assert len(topics) == 2  # a clash and a contact
-    seen = set()
-    for topic in topics:
-        markup = ElementTree.fromstring(files[f"{topic}/markup.bcf"])
-        assert markup.find("Topic").get("Guid") == topic
-        view = ElementTree.fromstring(files[f"{topic}/{markup.findtext('Viewpoints/Viewpoint')}"])
-        seen.add(tuple(sorted(e.text for e in view.iter("AuthoringToolId"))))
-        direction, at = (
-            np.array([float(e.text) for e in view.find(f"PerspectiveCamera/{name}")])
-            for name in ("CameraDirection", "CameraViewPoint")
-        )
-        assert np.linalg.norm(direction) == pytest.approx(1.0)
-        assert np.abs(at).max() < 0.2  # metres
-        assert direction @ (np.array([0.009, 0.0, 0.0]) - at) > 0.01  # it looks at the parts
-    assert seen == {("a", "b"), ("b", "c")}

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not installed")
@@ -77,6 +78,11 @@ def test_pandas_and_another_reader_of_bcf_open_the_findings(faulty: Path) -> Non
         for handler in topics:
             (view,) = handler.viewpoints.values()
             info = view.visualization_info
-            assert info.orthogonal_camera is not None or info.perspective_camera is not None
-            assert len(info.components.selection.component) >= 2  # both parts
+            named = {part.authoring_tool_id.partition("_")[0] for part in info.components.selection.component}
+            assert named == set(handler.topic.title.split(" clash")[0].split(" and "))
+            camera = info.perspective_camera
+            at, ahead = ([p.x, p.y, p.z] for p in (camera.camera_view_point, camera.camera_direction))
+            assert np.linalg.norm(ahead) == pytest.approx(1.0)
+            assert np.abs(at).max() < 0.2  # metres
+            assert np.dot(ahead, at) < -0.01  # it looks at the bearing, about the origin
             assert view.snapshot.startswith(b"\x89PNG")

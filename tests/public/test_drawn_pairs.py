@@ -107,19 +107,6 @@ def test_a_wire_at_the_edge_of_contact_is_decided():
 # --- Open CASCADE -----------------------------------------------------------------------------------------------------
 
 
-def as_cad(name):
-    """The bodies below, made by Open CASCADE."""
-    from tests.cad import block, cut, rod
-
-    return {
-        "box": lambda: block((-5, -4, -3), (5, 4, 3)),
-        "cylinder": lambda: rod(4.0, -8, 8),
-        "tube": lambda: cut(rod(6.0, -7, 7), rod(4.0, -9, 9)),
-        "plate": lambda: cut(block((-12, -9, -2), (12, 9, 2)), rod(3.0, -3, 3, 4.0, 2.0)),
-        "groove": lambda: cut(block((-15, -13.5, -12), (15, -3.5, 12)), rod(7.0, -13, 13)),
-    }[name]()
-
-
 BODIES = {
     "box": box((10, 8, 6)),
     "cylinder": cylinder(4.0, 16.0),
@@ -136,15 +123,16 @@ def test_random_poses_as_open_cascade_measures_them(pair):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
+    from clamp3d.output.step import solid
     from tests.cad import common_volume, moved, random_pose
 
-    one, two = pair.split("-")
+    one, two = (BODIES[name] for name in pair.split("-"))
     rng = np.random.default_rng(len(pair))
     seen = set()
     for k in range(10):
         T = random_pose(rng, 6.0 if k % 2 else 14.0)
-        a, b = as_cad(one), moved(as_cad(two), T)
-        truth, measured = BRepExtrema_DistShapeShape(a, b).Value(), distance(BODIES[one], BODIES[two], T)
+        a, b = solid(one), moved(solid(two), T)
+        truth, measured = BRepExtrema_DistShapeShape(a, b).Value(), distance(one, two, T)
         seen.add(truth > 0.0)
         if truth > 0.0:
             exactly(truth, measured, 2e-6)
