@@ -71,8 +71,6 @@ class Model:
     """Whether it is a drawn solid."""
     bracketed = False
     """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
-    thorough = False
-    """Whether its meshes may be finer than ``chords``, however large they are then."""
     exact: BrepSolid | None = None
     """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
 
@@ -113,15 +111,18 @@ class Model:
         """A mesh of chord error ``chord`` mm; of a bracketed part one that lies ``inside`` of it, or around it."""
         raise NotImplementedError
 
-    def outer(self, chord: float) -> Surface:
-        """Mesh of chord error ``chord`` mm that holds a drawn solid; of other shapes one whose errors are known."""
-        mesh = self._mesh(chord if self.thorough else max(chord, self.chords[-1]), inside=False)
+    def outer(self, chord: float, *, thorough: bool = False) -> Surface:
+        """Mesh of chord error ``chord`` mm that holds a drawn solid; of other shapes one whose errors are known.
+
+        Only a ``thorough`` one is finer than ``chords``, however large it is then.
+        """
+        mesh = self._mesh(chord if thorough else max(chord, self.chords[-1]), inside=False)
         assert mesh is not None
         return mesh
 
     def inner(self, chord: float) -> Surface | None:
         """Mesh of chord error ``chord`` mm that a drawn solid holds, or None; of other shapes the same as `outer`."""
-        return self._mesh(chord if self.thorough else max(chord, self.chords[-1]), inside=self.bracketed)
+        return self._mesh(max(chord, self.chords[-1]), inside=self.bracketed)
 
     def _mesh(self, chord: float, *, inside: bool) -> Surface | None:
         if (chord, inside) not in self._meshes:

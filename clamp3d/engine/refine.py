@@ -79,9 +79,8 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
         yield "exact", exact_distance(a, b, T)
         for share in SHARES:
             yield "exact", exact_overlap(a, b, T, share)
-        a.thorough = b.thorough = True  # Open CASCADE did not find the common part
-        for chord in LAST_CHORDS:
-            yield "meshes", meshes_distance(a, b, T, chord, enough)
+        for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
+            yield "meshes", meshes_distance(a, b, T, chord, enough, thorough=True)
 
 
 def _is_round(model: Model) -> bool:
