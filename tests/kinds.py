@@ -53,19 +53,19 @@ DRAWN = [
 ]
 
 
-def faceted_shape(solid: shapes.Solid, error: float, fit: shapes.Fit = "off") -> shapes.MeshShape:
+def faceted_shape(solid, error, fit="off"):
     """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
     facets = mesh(solid, error)
     return shapes.MeshShape(make_mesh(facets.vertices, facets.faces), fit, solid.name)
 
 
-def pose(axis: tuple[float, ...], angle: float, place: tuple[float, ...]) -> np.ndarray:
+def pose(axis, angle, place):
     T = rotation(axis, angle)
     T[:3, 3] = place
     return T
 
 
-def poses(reach: float) -> st.SearchStrategy:
+def poses(reach):
     """Rigid poses (4, 4) with offsets up to ``reach`` mm along each axis; upright ones are as likely as any."""
     angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
     axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)

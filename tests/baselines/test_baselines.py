@@ -1,9 +1,6 @@
 """The models wedges, hulls and mesh against the exact groove and the independent chords of the section."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +8,8 @@ from scipy.spatial import ConvexHull
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.chords import Chords
-from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters
+from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.baselines.hulls import Hulls
-from clamp3d.baselines.model import ContactModel
 from clamp3d.baselines.polytopes import Meshes
 from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.compare.scene import block_pair, grooved_block
@@ -23,9 +19,8 @@ from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.errors import InputError
 from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.pose import Array, inverse, rotation, translation
+from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
-from clamp3d.kernel.contact_model import GroovePair
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
@@ -34,7 +29,7 @@ MESH_ERROR = 0.0457
 CHORD = mesh(BLOCK, MESH_ERROR).metadata["chord_error"]
 
 
-def _poses(n: int, tilt: float, seed: int = 0) -> Array:
+def _poses(n, tilt, seed=0):
     """Wires about the middle of the groove, some of them through its walls; the wire's axis is Y."""
     rng = np.random.default_rng(seed)
     out = np.empty((n, 4, 4))
@@ -45,7 +40,7 @@ def _poses(n: int, tilt: float, seed: int = 0) -> Array:
     return out
 
 
-def _check_pieces(model: ContactModel, poses: Array) -> None:
+def _check_pieces(model, poses):
     """The least of the gaps is the distance, and each keeps the contract of points and normals."""
     distances = model.distances(PAIR, poses)
     for T, d in zip(poses, distances, strict=True):
@@ -55,7 +50,7 @@ def _check_pieces(model: ContactModel, poses: Array) -> None:
         assert np.allclose(np.linalg.norm(pieces.normal, axis=1), 1.0)
 
 
-def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
+def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt():
     poses = _poses(36, 0.02)
     exact = Cas().distances(PAIR, poses)
     model = Wedges({"P1": BLOCK}, math.radians(2.0))
@@ -68,7 +63,7 @@ def test_wedges_of_a_fine_unit_are_the_exact_groove_at_any_tilt() -> None:
     _check_pieces(model, poses[:4])
 
 
-def test_mesh_is_too_tight_by_its_chord_error_at_most() -> None:
+def test_mesh_is_too_tight_by_its_chord_error_at_most():
     poses = _poses(120, 0.02, seed=1)
     exact = Cas().distances(PAIR, poses)
     model = Meshes({"P1": BLOCK}, MESH_ERROR)
@@ -86,7 +81,7 @@ def test_mesh_is_too_tight_by_its_chord_error_at_most() -> None:
     _check_pieces(model, poses[apart][:4])
 
 
-def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
+def intrusion(decomposition, pair):
     """How far in mm the hulls reach into the groove: its radius less that of the thickest coaxial wire that is free.
 
     Exact for the hulls: the distance of the groove's axis, without end, from each hull's outline seen along it.
@@ -104,9 +99,7 @@ def intrusion(decomposition: Decomposition, pair: GroovePair) -> float:
     return pair.groove.radius - free
 
 
-def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(tmp_path, monkeypatch):
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
     settings = DecompositionParameters(threshold=0.05, real_metric=False)
     model = Hulls({"P1": BLOCK}, settings, mesh_error=0.5)
@@ -124,9 +117,9 @@ def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(
 
 @pytest.mark.parametrize("unit_deg", [5.0, 40.0])
 @pytest.mark.parametrize("key", [("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P3", "P2")])
-def test_wedges_of_the_reference_clamp_are_the_chords_of_its_section(key: tuple[str, str], unit_deg: float) -> None:
+def test_wedges_of_the_reference_clamp_are_the_chords_of_its_section(key, unit_deg):
     clamp, unit = load_clamp(), math.radians(unit_deg)
-    pair = groove_pairs(clamp)[key]  # type: ignore[index]
+    pair = groove_pairs(clamp)[key]
     T = pair.T_a_groove @ np.linalg.inv(pair.T_b_cylinder)
     rng = np.random.default_rng(3)
     poses = np.array([translation(*rng.uniform(-1.0, 1.0, 3)) @ T for _ in range(40)])
@@ -137,7 +130,7 @@ def test_wedges_of_the_reference_clamp_are_the_chords_of_its_section(key: tuple[
     assert ((wedges < 0.0) == (expected < 0.0)).all()
 
 
-def test_unknown_part_and_bad_pose_are_refused() -> None:
+def test_unknown_part_and_bad_pose_are_refused():
     model = Wedges({"P2": BLOCK}, 0.2)
     with pytest.raises(InputError, match="unknown part 'P1'; available: P2"):
         model.distances(PAIR, np.eye(4)[None])
@@ -148,7 +141,7 @@ def test_unknown_part_and_bad_pose_are_refused() -> None:
             checked.distances(PAIR, np.full((1, 4, 4), np.nan))
 
 
-def test_wedges_in_3d_assemble_the_clamp_to_the_published_distance() -> None:
+def test_wedges_in_3d_assemble_the_clamp_to_the_published_distance():
     clamp = load_clamp()
     result = assemble(clamp, Wedges(parts(clamp), math.radians(40.0)))
     assert result.clamped

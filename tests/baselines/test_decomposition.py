@@ -1,15 +1,12 @@
 """CoACD runs apart, within a time limit, once per content; what it cannot take never reaches it."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, cache_dir, decompose
+from clamp3d.baselines.decomposition import DecompositionParameters, cache_dir, decompose
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.meshing import mesh
@@ -19,7 +16,7 @@ BLOCK = grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, dep
 COARSE = DecompositionParameters(threshold=0.05, real_metric=False)
 
 
-def _meshed(chords: int) -> tuple[np.ndarray, np.ndarray]:
+def _meshed(chords):
     """The block's mesh with ``chords`` equal chords."""
     found = mesh(BLOCK, 24.0 * math.sin(math.radians(70.0) / chords / 2) ** 2 * (1.0 + 1e-9))
     return np.asarray(found.vertices), np.asarray(found.faces)
@@ -29,15 +26,15 @@ V, F = _meshed(4)
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path / "cache"))
 
 
-def _same(a: Decomposition, b: Decomposition) -> bool:
+def _same(a, b):
     return len(a.hulls) == len(b.hulls) and all(map(np.array_equal, a.hulls, b.hulls))
 
 
-def test_hulls_are_cached_by_content() -> None:
+def test_hulls_are_cached_by_content():
     first = decompose(V, F, COARSE)
     assert not first.cached
     assert first.seconds > 0.0
@@ -61,20 +58,20 @@ def test_hulls_are_cached_by_content() -> None:
     )
 
 
-def test_a_time_limit_ends_the_process() -> None:
+def test_a_time_limit_ends_the_process():
     with pytest.raises(SolverError, match=r"did not finish P1 in 2 s at threshold 0\.05; raise time_limit or thresh"):
         decompose(*_meshed(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=2.0)
     assert not cache_dir().exists()
 
 
-def test_a_process_that_fails_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_fails_is_said(monkeypatch):
     monkeypatch.setattr("clamp3d.baselines.decomposition._RUN", "os:abort")  # which takes no arguments
     with pytest.raises(SolverError, match="CoACD gave no hulls for P1: TypeError"):
         decompose(V, F, COARSE, name="P1")
     assert not cache_dir().exists()
 
 
-def test_a_bad_mesh_is_refused() -> None:
+def test_a_bad_mesh_is_refused():
     for vertices, faces, rule in ((np.full_like(V, np.nan), F, "finite"), (V, F[1:], "watertight")):
         with pytest.raises(InputError, match=rule):
             decompose(vertices, faces, COARSE)
@@ -88,6 +85,6 @@ def test_a_bad_mesh_is_refused() -> None:
         ({"threshold": 2.0, "real_metric": False}, "threshold must be <= 1 without real_metric"),
     ],
 )
-def test_parameters_are_checked(changes: dict[str, object], rule: str) -> None:
+def test_parameters_are_checked(changes, rule):
     with pytest.raises(InputError, match=rule):
-        DecompositionParameters(**changes)  # type: ignore[arg-type]
+        DecompositionParameters(**changes)

@@ -1,7 +1,5 @@
 """FCL against closed forms: distances and normals of boxes and wires, containment, and what must be refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,29 +8,29 @@ import trimesh
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from clamp3d.baselines.fcl_shapes import Shape, Wire, bvh, contained, convex, distance, facets, measure
+from clamp3d.baselines.fcl_shapes import Wire, bvh, contained, convex, distance, facets, measure
 from clamp3d.baselines.wedges import prism
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, rotation, translation
+from clamp3d.geometry.pose import rotation, translation
 from clamp3d.geometry.primitives import Cylinder
 
 V = prism(np.array([[-20.0, -10.0], [20.0, -10.0], [20.0, 10.0], [-20.0, 10.0]]), -25.0, 25.0)
 BOX, MESH = convex(V), bvh(trimesh.convex.convex_hull(V))
 
 
-def placed(radius: float, length: float, T: Array) -> Wire:
+def placed(radius, length, T):
     wire = Wire(Cylinder(radius, length))
     wire.place(T)
     return wire
 
 
-def _box_distance(x: float, y: float, r: float) -> float:
+def _box_distance(x, y, r):
     """Signed distance of a long wire along z at (x, y) from the section 40 x 20."""
     a, b = abs(x) - 20.0, abs(y) - 10.0
     return (math.hypot(max(a, 0.0), max(b, 0.0)) if max(a, b) > 0.0 else max(a, b)) - r
 
 
-def assert_touches_when_moved(shape: Shape, wire: Wire, normal: Array, d: float) -> None:
+def assert_touches_when_moved(shape, wire, normal, d):
     """Moving the wire by -distance along the normal makes the two just touch."""
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
     before = wire.T
@@ -46,9 +44,7 @@ def assert_touches_when_moved(shape: Shape, wire: Wire, normal: Array, d: float)
     x=st.floats(-40.0, 40.0), y=st.floats(-30.0, 30.0), r=st.floats(0.5, 30.0), length=st.floats(1.0, 300.0),
     turn=st.floats(-3.0, 3.0), axis=st.tuples(*[st.floats(0.1, 1.0)] * 3),
 )  # fmt: skip
-def test_parallel_wire_and_box(
-    x: float, y: float, r: float, length: float, turn: float, axis: tuple[float, float, float]
-) -> None:
+def test_parallel_wire_and_box(x, y, r, length, turn, axis):
     exact = _box_distance(x, y, r)
     assume(exact > -0.39 * min(r, length / 2))  # beyond, the depth is a bound
     assume(exact > -0.4 * min(length, 50.0))  # the way out along the axis must be longer
@@ -63,7 +59,7 @@ def test_parallel_wire_and_box(
 
 
 @pytest.mark.parametrize("gap", [1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-4, -1e-2, -1.0])
-def test_normal_is_right_however_small_the_gap(gap: float) -> None:
+def test_normal_is_right_however_small_the_gap(gap):
     for turn in np.linspace(0.0, 6.0, 7):
         T = translation(3.0, 17.0 + gap, 1.0) @ rotation([0.0, 0.0, 1.0], turn)
         found = measure(BOX, placed(7.0, 200.0, T))
@@ -73,14 +69,14 @@ def test_normal_is_right_however_small_the_gap(gap: float) -> None:
 
 
 @pytest.mark.parametrize("gap", [1.0, 1e-2])
-def test_normal_at_a_rim_is_the_way_to_the_part(gap: float) -> None:
+def test_normal_at_a_rim_is_the_way_to_the_part(gap):
     T = translation(0.0, 10.0 + gap + (10.0 + 7.0) * math.sqrt(0.5), 0.0) @ rotation([1.0, 0.0, 0.0], math.pi / 4)
     found = measure(BOX, placed(7.0, 20.0, T))
     assert found.distance == pytest.approx(gap, abs=1e-6)
     assert np.abs(found.normal - [0.0, 1.0, 0.0]).max() < 1e-3
 
 
-def test_touching_poses_neither_end_nor_hang_the_interpreter() -> None:
+def test_touching_poses_neither_end_nor_hang_the_interpreter():
     # FCL's own signed distance aborts on some of these.
     rng = np.random.default_rng(0)
     for _ in range(200):
@@ -93,7 +89,7 @@ def test_touching_poses_neither_end_nor_hang_the_interpreter() -> None:
 @settings(max_examples=40, deadline=None)
 @given(x=st.floats(-40.0, 40.0), y=st.floats(-30.0, 30.0), r=st.floats(0.5, 12.0))
 @example(1.0, 9.625, 0.5)
-def test_mesh_knows_apart_from_crossing(x: float, y: float, r: float) -> None:
+def test_mesh_knows_apart_from_crossing(x, y, r):
     exact = _box_distance(x, y, r)
     assume(abs(exact) > 1e-6)
     wire = placed(r, 200.0, translation(x, y, 0.0))
@@ -108,7 +104,7 @@ def test_mesh_knows_apart_from_crossing(x: float, y: float, r: float) -> None:
         assert min(single) == pytest.approx(found.distance, abs=1e-6)
 
 
-def test_wire_inside_the_wall_is_contained() -> None:
+def test_wire_inside_the_wall_is_contained():
     found = measure(MESH, placed(2.0, 10.0, translation(11.0, 3.0, 5.0)))
     assert found.distance == pytest.approx(-(5.0 + 4.0), abs=1e-6)  # 5 mm under the top, 4 mm thick
     assert found.normal == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
@@ -119,7 +115,7 @@ def test_wire_inside_the_wall_is_contained() -> None:
         assert contained(shape, wire) == inside == (measure(shape, wire).distance < 0.0)
 
 
-def test_sizes_that_fcl_does_not_measure_well_are_refused() -> None:
+def test_sizes_that_fcl_does_not_measure_well_are_refused():
     for factor in (1e-3, 1e4):  # metres, or far too large
         with pytest.raises(InputError, match=r"largest extent must be from 0\.1 to 10000 mm for FCL"):
             convex(V * factor)

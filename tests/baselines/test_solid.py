@@ -1,7 +1,5 @@
 """Every mesh that would end CoACD or FCL, or fool them, is refused with one line that says why."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ F = np.array(
 )  # fmt: skip
 
 
-def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
+def _with(array, row, value):
     out = array.astype(np.result_type(array, np.asarray(value)))
     out[row] = value
     return out
@@ -45,16 +43,16 @@ def _with(array: np.ndarray, row: int, value: object) -> np.ndarray:
         (V * [1.0, 1.0, 0.0], F, "2 doubled triangles left out"),
     ],
 )
-def test_bad_mesh_is_one_clear_line(vertices: object, faces: object, rule: str) -> None:
+def test_bad_mesh_is_one_clear_line(vertices, faces, rule):
     with pytest.raises(InputError) as caught:
-        closed_mesh(vertices, faces, "part P9")  # type: ignore[arg-type]
+        closed_mesh(vertices, faces, "part P9")
     message = str(caught.value)
     assert message.startswith("part P9")
     assert rule in message
     assert "\n" not in message
 
 
-def test_corners_of_triangles_are_merged_and_cavities_kept() -> None:
+def test_corners_of_triangles_are_merged_and_cavities_kept():
     soup = closed_mesh(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3))
     assert len(soup.vertices) == 8
     assert {tuple(map(tuple, soup.vertices[face])) for face in soup.faces} == {tuple(map(tuple, V[f])) for f in F}

@@ -1,7 +1,5 @@
 """Wedges fill the outline with chords for arcs: once, and all of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,17 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.baselines.fcl_shapes import convex
-from clamp3d.baselines.wedges import Wedge, part_wedges, prism
+from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.errors import InputError
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Arc
-from clamp3d.geometry.shapes import Solid
 
 
-def assert_filled_once(wedges: list[Wedge], outline: shapely.Polygon) -> None:
+def assert_filled_once(wedges, outline):
     """The pieces are convex, do not overlap, and together are the outline."""
     polygons = [shapely.Polygon(wedge.polygon) for wedge in wedges]
     assert all(p.convex_hull.area == pytest.approx(p.area, rel=1e-9) for p in polygons)
@@ -35,7 +32,7 @@ def assert_filled_once(wedges: list[Wedge], outline: shapely.Polygon) -> None:
     radius=st.floats(1.0, 60.0), half_deg=st.floats(2.0, 150.0), unit_deg=st.floats(1.0, 170.0),
     spare=st.floats(0.1, 50.0),
 )  # fmt: skip
-def test_block_is_filled_once(radius: float, half_deg: float, unit_deg: float, spare: float) -> None:
+def test_block_is_filled_once(radius, half_deg, unit_deg, spare):
     half, unit = math.radians(half_deg), math.radians(unit_deg)
     face = radius * math.cos(half)
     width = 2.0 * (radius * math.sin(min(half, math.pi / 2)) + spare)
@@ -51,8 +48,8 @@ def test_block_is_filled_once(radius: float, half_deg: float, unit_deg: float, s
 
 @pytest.mark.parametrize("name", ["P1", "P2", "P3"])
 @pytest.mark.parametrize("unit_deg", [1.0, 40.0])
-def test_clamp_parts_are_filled_once(name: str, unit_deg: float) -> None:
-    part: Solid = parts(load_clamp())[name]  # type: ignore[index]
+def test_clamp_parts_are_filled_once(name, unit_deg):
+    part = parts(load_clamp())[name]
     unit, corners = math.radians(unit_deg), []
     for edge in part.bodies[0].profile.edges:
         corners.append(edge.start)
@@ -66,7 +63,7 @@ def test_clamp_parts_are_filled_once(name: str, unit_deg: float) -> None:
         assert len(convex(prism(wedge.polygon, -30.0, 30.0)).solid.vertices) == 2 * len(wedge.polygon)
 
 
-def test_parts_without_wedges_are_refused() -> None:
+def test_parts_without_wedges_are_refused():
     clamp = parts(load_clamp())
     with pytest.raises(InputError, match="part P6 must have a groove"):
         part_wedges(clamp["P6"], 0.1)

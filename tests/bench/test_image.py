@@ -1,11 +1,7 @@
 """Image measurement: closed forms for marks, pixel truth for pictures, the paper's five values for the errors."""
 
-from __future__ import annotations
-
 import json
 import math
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,26 +19,25 @@ from clamp3d.bench.image import (
     marked_distances,
     measure_image,
 )
-from clamp3d.bench.picture import Picture, find_end_points, picture, snap_marks
+from clamp3d.bench.picture import find_end_points, picture, snap_marks
 from clamp3d.bench.published import ACTUAL_DISTANCE, IMAGE_DISTANCES
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.result import Assembly
 from clamp3d.cli.bench import MeasureImage
 from clamp3d.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def run() -> Assembly:
+def run():
     return assemble(load_clamp(), Cas())
 
 
 @pytest.fixture(scope="module")
-def shown(run: Assembly) -> Picture:
+def shown(run):
     return picture(run, PX_PER_MM)
 
 
-def test_perfect_marks_give_the_exact_distance(run: Assembly, shown: Picture) -> None:
+def test_perfect_marks_give_the_exact_distance(run, shown):
     left, right, below = shown.end_points
     measured = measure_image([left, below], [left, right], shown.reference)
     assert measured.distance == pytest.approx(run.distance, abs=1e-12)
@@ -54,7 +49,7 @@ def test_perfect_marks_give_the_exact_distance(run: Assembly, shown: Picture) ->
     assert measured.straight - measured.height == pytest.approx(0.684, abs=1e-3)
 
 
-def _calibrated(shown: Picture, actual: float, values: Sequence[float]) -> tuple[float, float, float]:
+def _calibrated(shown, actual, values):
     """Marking error in px that gives ``values`` their rms error about ``actual`` mm, and its 95 % interval."""
     rms = math.sqrt(math.fsum((v - actual) ** 2 for v in values) / len(values))
     left, right, below = shown.end_points
@@ -65,7 +60,7 @@ def _calibrated(shown: Picture, actual: float, values: Sequence[float]) -> tuple
     return rms / per_pixel, low, high
 
 
-def test_default_errors_are_those_of_the_published_values(shown: Picture) -> None:
+def test_default_errors_are_those_of_the_published_values(shown):
     error, low, high = _calibrated(shown, ACTUAL_DISTANCE, IMAGE_DISTANCES)
     assert error == pytest.approx(MARKING_ERROR, abs=0.05)
     assert low < error < high
@@ -79,7 +74,7 @@ def test_default_errors_are_those_of_the_published_values(shown: Picture) -> Non
 @pytest.mark.parametrize(
     ("scale", "line", "jumper"), [(2.0, "LJ-630", "LJ-120"), (3.3, "LJ-500", "LJ-500"), (6.0, "LJ-240", "LJ-400")]
 )
-def test_found_end_points_are_the_drawn_ones(scale: float, line: str, jumper: str) -> None:
+def test_found_end_points_are_the_drawn_ones(scale, line, jumper):
     closed = assemble(load_clamp(line=line, jumper=jumper), Cas())
     drawn = picture(closed, scale)
     error = find_end_points(drawn.image) - drawn.end_points
@@ -87,7 +82,7 @@ def test_found_end_points_are_the_drawn_ones(scale: float, line: str, jumper: st
     assert error.std() < 2.0 * FITTING_ERROR
 
 
-def test_study(run: Assembly) -> None:
+def test_study(run):
     study = image_study(run, count=20_000, seed=7)
     assert study.trials == pytest.approx(study.exact + study.errors[:5])
     rms = np.sqrt(np.mean(study.errors**2))
@@ -95,7 +90,7 @@ def test_study(run: Assembly) -> None:
     assert abs(study.automatic.distance - run.distance) < 4.0 * study.automatic.uncertainty < 0.12
 
 
-def test_snapping_finds_the_corner(shown: Picture) -> None:
+def test_snapping_finds_the_corner(shown):
     rng = np.random.default_rng(5)
     marks = shown.end_points + rng.uniform(-4.0, 4.0, (3, 2))
     assert np.abs(snap_marks(shown.image, marks, 10.0) - shown.end_points).max() < 0.3
@@ -103,7 +98,7 @@ def test_snapping_finds_the_corner(shown: Picture) -> None:
         snap_marks(shown.image, np.array([[10.0, 10.0]]), 5.0)
 
 
-def test_bad_values() -> None:
+def test_bad_values():
     good = [(0.0, 0.0), (3.0, 4.0)]
     for arguments, message in (
         (([(0, 0)], good, 1.0), "points must have shape"),
@@ -113,14 +108,14 @@ def test_bad_values() -> None:
         ((good, "ab", 1.0), "reference must be an array of numbers"),
     ):
         with pytest.raises(InputError, match=message):
-            measure_image(*arguments)  # type: ignore[arg-type]
+            measure_image(*arguments)
     with pytest.raises(InputError, match="marking_error"):
         measure_image(good, good, 1.0, marking_error=-1.0)
     with pytest.raises(InputError, match="no region of the colour of P1"):
         find_end_points(np.full((50, 50, 3), 236, dtype=np.uint8))
 
 
-def test_the_command_measures_a_photograph(shown: Picture, tmp_path: Path) -> None:
+def test_the_command_measures_a_photograph(shown, tmp_path):
     file, out = tmp_path / "clamp.png", tmp_path / "out.json"
     Image.fromarray(shown.image).save(file)
     (tmp_path / "text.png").write_text("not a picture")

@@ -1,16 +1,13 @@
 """The paper's tables: the connection matrix is measured and echoes nothing, errors are what they say."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from clamp3d.bench import published
-from clamp3d.bench.reproduce import ConnectionRow, Reproduction, connection_rows, reproduce
+from clamp3d.bench.reproduce import connection_rows, reproduce
 from clamp3d.bench.reproduce_report import reproduction_to_text
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.loader import load_clamp
@@ -18,15 +15,15 @@ from clamp3d.cli import group
 
 
 @pytest.fixture(scope="module")
-def tables() -> Reproduction:
+def tables():
     return reproduce()
 
 
-def _by_pair(rows: tuple[ConnectionRow, ...]) -> dict[tuple[str, str], ConnectionRow]:
+def _by_pair(rows):
     return {(row.a, row.b): row for row in rows}
 
 
-def test_measured_types_do_not_follow_the_declaration() -> None:
+def test_measured_types_do_not_follow_the_declaration():
     clamp = load_clamp()
     connections = {a: dict(row) for a, row in clamp.connections.items()}
     connections["P1"]["P3"] = connections["P2"]["P5"] = 2
@@ -39,14 +36,14 @@ def test_measured_types_do_not_follow_the_declaration() -> None:
     assert {pair: row.measured for pair, row in rows.items()} == {pair: row.measured for pair, row in honest.items()}
 
 
-def test_the_bolt_touches_no_splint_and_the_table_says_so(tables: Reproduction) -> None:
+def test_the_bolt_touches_no_splint_and_the_table_says_so(tables):
     rows = _by_pair(tables.table1)
     assert len(rows) == 21
     different = {pair for pair, row in rows.items() if row.difference}
     assert different == {("P1", "P4"), ("P2", "P4")}
     text = reproduction_to_text(tables).splitlines()
     for pair in ("P1-P4", "P2-P4"):
-        assert rows[tuple(pair.split("-"))].distance.upper > 0.99  # type: ignore[index]
+        assert rows[tuple(pair.split("-"))].distance.upper > 0.99
         (line,) = [line for line in text if line.startswith(f"  {pair} ")]
         assert line.split()[1:4] == ["2", "2", "0"]
         assert "does not touch" in line
@@ -54,7 +51,7 @@ def test_the_bolt_touches_no_splint_and_the_table_says_so(tables: Reproduction) 
     assert gap == pytest.approx(1.0, abs=1e-6)
 
 
-def test_errors_of_table_4_are_those_that_the_paper_prints(tables: Reproduction) -> None:
+def test_errors_of_table_4_are_those_that_the_paper_prints(tables):
     printed = {None: 0.100, 1.0: 0.233, 5.0: 0.233, 10.0: 0.233, 20.0: 0.566, 40.0: 1.233}
     for row in tables.table4:
         assert row.published_error == pytest.approx(printed[row.unit_angle_deg], abs=1e-9)
@@ -66,7 +63,7 @@ def test_errors_of_table_4_are_those_that_the_paper_prints(tables: Reproduction)
     assert all(f"{error:.3f}" in text for error in (*printed.values(), *image))
 
 
-def test_the_command_matches_the_paper(tables: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_matches_the_paper(tables, tmp_path, monkeypatch):
     monkeypatch.setattr("clamp3d.bench.reproduce.reproduce", lambda progress: tables)
     path = tmp_path / "r.json"
     done = CliRunner().invoke(group, ["reproduce", "--json", str(path)])

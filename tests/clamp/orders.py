@@ -5,8 +5,6 @@ is free if no point of the lattice on it overlaps anything. Every way of the lat
 every set of others: 6 x 32 questions. Nothing of the search for ways, and nothing of the pair engine, is used.
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

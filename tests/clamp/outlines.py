@@ -8,28 +8,22 @@ where something is near. Nothing is taken from the solver's closed forms, its jo
 most ``_FINE**2 / (8 r)`` of an arc, 1e-6 mm.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import minimize
-
-from clamp3d.clamp.dimensions import Clamp
-from clamp3d.geometry.pose import Array
 
 _COARSE, _FINE = 0.05, 0.005
 _NEAR = (0.6, 0.03)
 """Gaps in mm of the points that count, of the coarse and of the fine row."""
 
 
-def _row(start: Array, end: Array, step: float) -> Array:
+def _row(start, end, step):
     n = max(2, math.ceil(math.dist(start, end) / step) + 1)
     return np.linspace(start, end, n)
 
 
-def outline(clamp: Clamp, part: str, side: float, step: float) -> Array:
+def outline(clamp, part, side, step):
     """Points (n, 2) on the outline of "P1" or "P2" on one side of the bolt, in the part's own (x, y), y down."""
     own, middle = (clamp.up_splint, clamp.up_splint.width / 2) if part == "P1" else (clamp.down_splint, 0.0)
     face = clamp.up_splint.thickness if part == "P1" else clamp.down_splint.face_depth
@@ -50,7 +44,7 @@ def outline(clamp: Clamp, part: str, side: float, step: float) -> Array:
 class Outlines:
     """A clamp by points; a state is (x6, y6, x7, y7, x, y and tilt of P2, bolt x, saddle x and height), P1 at rest."""
 
-    def __init__(self, clamp: Clamp) -> None:
+    def __init__(self, clamp):
         self.clamp = clamp
         self.middle = clamp.up_splint.width / 2
         self.rows = {
@@ -60,14 +54,14 @@ class Outlines:
         self.radii = clamp.line.radius, clamp.jumper.radius
         self.clear = clamp.saddle.radius - clamp.down_splint.back_radius
 
-    def state(self, q: Array) -> Array:
+    def state(self, q):
         """The state of a `Section`'s ``q``, with the parts placed by hand."""
         clamp = self.clamp
         bolt = self.middle + q[6]
         saddle, x = bolt + q[7], bolt + q[7] + q[8]
         return np.array([*q[:4], x, q[4] - q[9], q[5] / (clamp.down_splint.width / 2), bolt, saddle, q[4]])
 
-    def gaps(self, z: Array, chosen: Sequence[tuple[Array, ...]]) -> Array:
+    def gaps(self, z, chosen):
         """All gaps: wires to the points ``chosen``, wires to the shank, faces, slot, saddle, joints."""
         clamp, down = self.clamp, self.clamp.down_splint
         x, y, tilt, bolt, saddle, height = z[4:]
@@ -93,7 +87,7 @@ class Outlines:
             found.append(side * (walls[:, 0] - bolt) - 0.5 * clamp.bolt.diameter)
         return np.concatenate(found)
 
-    def joints(self, z: Array) -> Array:
+    def joints(self, z):
         """What the joints leave: round back over the saddle's arc, bolt in the hole, saddle on the bolt (>= 0)."""
         clamp, joints = self.clamp, self.clamp.joints
         x, y, _, bolt, saddle, height = z[4:]
@@ -113,7 +107,7 @@ class Outlines:
         walls = (play - side * shift for play, shift in plays if math.isfinite(play) for side in (-1.0, 1.0))
         return np.array([within, *walls])
 
-    def lowest(self, q: Array) -> tuple[float, float]:
+    def lowest(self, q):
         """The saddle's least height near the state ``q`` of a `Section`, and by how much ``q`` itself overlaps; mm."""
         z = self.state(q)
         overlap = -min(float(self.gaps(z, self.rows[_FINE]).min()), float(self.joints(z).min()))
@@ -123,7 +117,7 @@ class Outlines:
             z = self._descend(z, step, near)
         return float(z[9]), max(0.0, overlap)
 
-    def _descend(self, z: Array, step: float, near: float) -> Array:
+    def _descend(self, z, step, near):
         """Down from ``z`` in stretches short enough that the points near its beginning are those that count."""
         spread = np.array([1.0] * 6 + [0.5 / self.clamp.down_splint.width] + [1.0] * 3) * 0.4 * near
         for _ in range(20):
@@ -155,7 +149,7 @@ class Outlines:
         return z
 
 
-def _placed(z: Array, points: Array) -> Array:
+def _placed(z, points):
     """Points (n, 2) of the down splint at the state ``z``."""
     c, s = math.cos(z[6]), math.sin(z[6])
     return np.column_stack([z[4] + points[:, 0] * c + points[:, 1] * s, z[5] - points[:, 0] * s + points[:, 1] * c])

@@ -1,10 +1,7 @@
 """Random clamps of all dimensions, closed by every command and judged by means that know nothing of the solver."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +10,7 @@ from outlines import Outlines
 from clamp3d.baselines.cas import Cas
 from clamp3d.bench.stress.assemblies.clamps import Case
 from clamp3d.bench.stress.assemblies.family import EXACT, Assemblies, Rest, Truths
-from clamp3d.clamp.dimensions import Clamp, Joints, Wire
+from clamp3d.clamp.dimensions import Joints, Wire
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
@@ -33,7 +30,7 @@ class Score:
     worst: dict[str, float] = field(default_factory=dict)
     findings: list[tuple[int, str]] = field(default_factory=list)
 
-    def note(self, k: int, what: str, error: float, allowed: float) -> None:
+    def note(self, k, what, error, allowed):
         """Count a check of clamp ``k``; not a number is a finding too."""
         self.asked[what] += 1
         self.worst[what] = max(self.worst.get(what, 0.0), error)
@@ -41,11 +38,11 @@ class Score:
             self.findings.append((k, f"{what}: {error:.3g}"))
 
 
-def whole_clamp(rng: np.random.Generator, *, major: float = 0.25) -> Clamp:
+def whole_clamp(rng, *, major=0.25):
     """A clamp with all dimensions varied by 15 %; the share ``major`` of the grooves are major arcs."""
     base = load_clamp()
 
-    def about(value: float, share: float = 0.15) -> float:
+    def about(value, share=0.15):
         return float(value * rng.uniform(1.0 - share, 1.0 + share))
 
     while True:
@@ -105,9 +102,7 @@ def whole_clamp(rng: np.random.Generator, *, major: float = 0.25) -> Clamp:
             continue
 
 
-def check_clamps(
-    n: int, seed: int, first: int = 0, listen: Callable[[int, Score], None] = lambda k, score: None
-) -> Score:
+def check_clamps(n, seed, first=0, listen=lambda k, score: None):
     """Check ``n`` random clamps from number ``first`` on.
 
     All are closed by an optimiser too, and each sixth has its equilibria from a grid.
@@ -124,7 +119,7 @@ def check_clamps(
     return score
 
 
-def optimised(score: Score, k: int, clamp: Clamp) -> None:
+def optimised(score, k, clamp):
     """The distance against that of the optimiser on sampled outlines."""
     play = "with play" if clamp.joints.hole else "without play"
     try:
@@ -137,7 +132,7 @@ def optimised(score: Score, k: int, clamp: Clamp) -> None:
     score.note(k, f"optimiser {play}", max(abs(least - float(q[D])), overlap), OPTIMISER)
 
 
-def grid(score: Score, k: int, clamp: Clamp) -> None:
+def grid(score, k, clamp):
     """All equilibria of a clamp of minor arcs against those of a grid of tilts."""
     states = equilibria(Section(clamp, Cas()))
     truths = Truths(Assemblies([Case(clamp)], np.arange(1)))

@@ -1,7 +1,5 @@
 """The public way in: `assemble` and what it answers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +11,19 @@ from clamp3d.errors import InputError
 
 
 @pytest.mark.parametrize("line", [16, 16.0, np.float64(16), np.float32(16), np.int64(16), np.array(16.0), "16"])
-def test_a_wire_is_a_number_or_a_name(line: object) -> None:
-    assert load_clamp(line=line).line.radius == 8.0  # type: ignore[arg-type]
+def test_a_wire_is_a_number_or_a_name(line):
+    assert load_clamp(line=line).line.radius == 8.0
 
 
 @pytest.mark.parametrize("line", [0, -1.0, np.nan, np.inf, True, [16], "LJ-17", b"16"])
-def test_what_is_no_wire_is_named(line: object) -> None:
+def test_what_is_no_wire_is_named(line):
     with pytest.raises(InputError) as caught:
-        load_clamp(line=line)  # type: ignore[arg-type]
+        load_clamp(line=line)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(("line ", "unknown conductor "))
 
 
-def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path: Path) -> None:
+def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path):
     copy = tmp_path / "copy.toml"
     copy.write_text((Path(__file__).parents[2] / "clamp3d/clamp/data/reference.toml").read_text())
     found = [assemble(clamp, line="LJ-500", jumper=16) for clamp in ("reference", copy, load_clamp())]
@@ -33,7 +31,7 @@ def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path: Path) -> None:
     assert repr(found[0]) == f"<Assembly reference: clamped, {found[0].distance:.3f} mm>"
 
 
-def test_scenes_are_the_parts_at_their_poses() -> None:
+def test_scenes_are_the_parts_at_their_poses():
     assembly = assemble()
     for waypoint in (assembly.path[0], assembly.path[-1]):
         scene = assembly.scene_at(waypoint)

@@ -1,7 +1,5 @@
 """Where a clamp catches a wire, against a motion of the same law by springs and points on outlines."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

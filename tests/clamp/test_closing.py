@@ -1,7 +1,5 @@
 """The closing path: one answer in every command, stops that are there, play, forces and their virtual work."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -16,10 +14,10 @@ from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.section import EDGES, SIZE, B, D, Gaps, S, Section, U
+from clamp3d.clamp.section import EDGES, SIZE, B, D, S, Section, U
 
 
-def test_an_optimiser_and_a_grid_agree() -> None:
+def test_an_optimiser_and_a_grid_agree():
     """Two of the clamps that ``scripts/check-clamps`` takes hundreds of."""
     score = check_clamps(2, 1)
     assert score.findings == []
@@ -27,7 +25,7 @@ def test_an_optimiser_and_a_grid_agree() -> None:
     assert score.asked["equilibria named"] == 1
 
 
-def test_the_open_clamp_overlaps_nothing_at_any_tilt() -> None:
+def test_the_open_clamp_overlaps_nothing_at_any_tilt():
     for k in range(60):
         section = Section(whole_clamp(np.random.default_rng([9, k])), Cas())
         for tilt in section.clamp.tilt_stop * np.linspace(-1.0, 1.0, 5):
@@ -37,7 +35,7 @@ def test_the_open_clamp_overlaps_nothing_at_any_tilt() -> None:
 
 
 @pytest.mark.parametrize("joints", [Joints(), Joints(hole=True, saddle=True, washer=True)])
-def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joints: Joints) -> None:
+def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joints):
     """An optimiser that knows neither states nor multipliers closes as far, and the edge carries the bolt's force."""
     clamp = replace(whole_clamp(np.random.default_rng([0, 204])), joints=joints)
     final = solve_final_state(Section(clamp, Cas()))
@@ -61,7 +59,7 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
         (Joints(hole=True, saddle=True, washer=True), 31.416),
     ],
 )
-def test_play_lets_the_reference_clamp_close_further(joints: Joints, distance: float) -> None:
+def test_play_lets_the_reference_clamp_close_further(joints, distance):
     run = assemble(replace(load_clamp(), joints=joints))
     assert run.clamped
     assert round(run.distance, 3) == distance
@@ -70,7 +68,7 @@ def test_play_lets_the_reference_clamp_close_further(joints: Joints, distance: f
     assert x == pytest.approx(0.0, abs=1e-9)  # nothing sideways is left over that no contact carries
 
 
-def test_forces_do_the_virtual_work_of_a_gap_that_is_opened() -> None:
+def test_forces_do_the_virtual_work_of_a_gap_that_is_opened():
     """Padding the contact k by e lifts the distance by its force times e."""
     section = Section(load_clamp(), Cas())
     final = solve_final_state(section)
@@ -85,13 +83,13 @@ def test_forces_do_the_virtual_work_of_a_gap_that_is_opened() -> None:
 
 
 class _Padded(Section):
-    def gaps(self, q: np.ndarray) -> Gaps:
+    def gaps(self, q):
         gaps = super().gaps(q)
         gaps.value[self.__dict__["row"]] -= self.__dict__["pad"]
         return gaps
 
 
-def test_forces_on_each_wire_and_on_the_down_splint_balance() -> None:
+def test_forces_on_each_wire_and_on_the_down_splint_balance():
     run = assemble()
     for part in ("P6", "P7", "P2"):
         total = sum(f.force * f.direction * ((f.b == part) - (f.a == part)) for f in run.forces)
@@ -105,7 +103,7 @@ def test_forces_on_each_wire_and_on_the_down_splint_balance() -> None:
     assert moment == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove() -> None:
+def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove():
     """Small up groove, set 10 mm aside: the mouth is no wall."""
     base = load_clamp(line=16, jumper=16)
     up = base.up_splint
@@ -120,14 +118,14 @@ def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove() -> None:
 
 
 @pytest.mark.parametrize("tilt_deg", [12.9, 12.98])
-def test_the_tilt_stops_where_the_bodies_meet(tilt_deg: float) -> None:
+def test_the_tilt_stops_where_the_bodies_meet(tilt_deg):
     """At the derived stop the exact bodies touch; a little less and they are apart, a little more and they overlap."""
     from clamp3d.clamp.contact import measure_contacts
 
     clamp = load_clamp()
     section = Section(clamp, Cas())
 
-    def gap(tilt: float) -> float:
+    def gap(tilt):
         q = np.zeros(SIZE)
         q[D], q[S] = 60.0, section.lever * tilt
         (c,) = measure_contacts(clamp, section.poses(q, saddle_d=60.0), pairs=[("P2", "P3")])

@@ -1,7 +1,5 @@
 """Contacts: measured in 3D by the engine, on the parts, and compared with the declared matrix in both directions."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -13,10 +11,9 @@ from click.testing import CliRunner
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.dimensions import Clamp, GrooveDimensions
+from clamp3d.clamp.dimensions import GrooveDimensions
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.surfaces import SURFACES, surfaces_at
 from clamp3d.cli import group
 from clamp3d.engine.distance import measure
@@ -25,12 +22,12 @@ WIRES = [("LJ-630", "LJ-120"), ("LJ-16", "LJ-16"), ("LJ-500", "LJ-400"), (46.0, 
 
 
 @pytest.fixture(scope="module", params=WIRES, ids=lambda wires: f"{wires[0]} {wires[1]}".replace("/", "-"))
-def assembly(request: pytest.FixtureRequest) -> Assembly:
+def assembly(request):
     line, jumper = request.param
     return assemble(line=line, jumper=jumper)
 
 
-def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(assembly: Assembly) -> None:
+def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(assembly):
     """A section through the middle shows the distance: shapely measures the outlines, chords are within 1e-5 mm."""
     for waypoint in assembly.path:
         outline = {}
@@ -44,7 +41,7 @@ def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(assembl
             assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
 
 
-def test_distances_of_the_reference_are_those_in_space() -> None:
+def test_distances_of_the_reference_are_those_in_space():
     """Measured on the exported STEP by Open CASCADE: 3.729354 and 1.000000 (the slot is 1 mm longer than the bolt)."""
     gaps = {(c.a, c.b): c for c in assemble().contacts}
     assert gaps["P1", "P2"].gap == pytest.approx(3.729354, abs=1e-6)
@@ -54,7 +51,7 @@ def test_distances_of_the_reference_are_those_in_space() -> None:
         assert gaps[pair].feature == "hole"
 
 
-def test_reference_differs_from_its_matrix_where_the_bolt_has_play() -> None:
+def test_reference_differs_from_its_matrix_where_the_bolt_has_play():
     assembly = assemble()
     assert [(d.a, d.b, d.declared, d.measured) for d in assembly.matrix_differences] == [
         ("P1", "P4", 2, 0),
@@ -74,13 +71,13 @@ def test_reference_differs_from_its_matrix_where_the_bolt_has_play() -> None:
     assert CliRunner().invoke(group, ["run", "-q"]).exit_code == 0
 
 
-def with_matrix(**rows: dict[str, int]) -> Clamp:
+def with_matrix(**rows):
     clamp = load_clamp()
     merged = {a: {**clamp.connections.get(a, {}), **rows.get(a, {})} for a in {*clamp.connections, *rows}}
     return replace(clamp, connections=merged)
 
 
-def test_declared_contacts_that_are_not_there_are_named() -> None:
+def test_declared_contacts_that_are_not_there_are_named():
     assembly = assemble(with_matrix(P1={"P3": 2}, P2={"P5": 2}))
     found = {(d.a, d.b): d for d in assembly.matrix_differences}
     assert set(found) == {("P1", "P3"), ("P1", "P4"), ("P2", "P4"), ("P2", "P5")}
@@ -91,7 +88,7 @@ def test_declared_contacts_that_are_not_there_are_named() -> None:
     assert not assembly.undeclared
 
 
-def test_contacts_that_are_not_declared_are_named_and_a_finding() -> None:
+def test_contacts_that_are_not_declared_are_named_and_a_finding():
     clamp = load_clamp()
     rows = {a: {b: kind for b, kind in row.items() if (a, b) != ("P3", "P4")} for a, row in clamp.connections.items()}
     assembly = assemble(replace(clamp, connections=rows))
@@ -102,18 +99,18 @@ def test_contacts_that_are_not_declared_are_named_and_a_finding() -> None:
     assert assembly.findings[0].text == str(undeclared)
 
 
-def test_a_type_that_is_not_the_declared_one_is_a_difference() -> None:
+def test_a_type_that_is_not_the_declared_one_is_a_difference():
     assembly = assemble(with_matrix(P2={"P7": 2}))
     found = {(d.a, d.b): (d.declared, d.measured) for d in assembly.matrix_differences}
     assert found["P2", "P7"] == (2, 3)
     assert "warning" in {f.severity for f in assembly.findings if "P2-P7" in f.text}
 
 
-def against_the_bolt() -> Clamp:
+def against_the_bolt():
     """Thick wires on narrow grooves near the bolt: in their middle they would reach 6 mm into its shank."""
     clamp = load_clamp(line=52, jumper=52)
 
-    def grooves(depth: float) -> dict[str, GrooveDimensions]:
+    def grooves(depth):
         groove = GrooveDimensions(radius=15.0, offset=30.0, centre_depth=depth)
         return {"line_groove": groove, "jumper_groove": groove}
 
@@ -126,7 +123,7 @@ def against_the_bolt() -> Clamp:
     )
 
 
-def test_the_bolt_stops_wires_and_is_named() -> None:
+def test_the_bolt_stops_wires_and_is_named():
     assembly = assemble(against_the_bolt())
     gaps = {(c.a, c.b): c.gap for c in assembly.contacts}
     assert min(gaps.values()) > -1e-8
@@ -137,7 +134,7 @@ def test_the_bolt_stops_wires_and_is_named() -> None:
     assert {(f.a, f.b) for f in assembly.forces if f.force > 0.1} >= {("P4", "P6"), ("P4", "P7")}
 
 
-def test_plain_data_and_frame() -> None:
+def test_plain_data_and_frame():
     pandas = pytest.importorskip("pandas")
     assembly = assemble()
     data = json.loads(json.dumps(assembly.to_dict(), allow_nan=False))
@@ -151,7 +148,7 @@ def test_plain_data_and_frame() -> None:
 
 
 @pytest.mark.parametrize("unit_deg", [5.0, 20.0])
-def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
+def test_a_contact_model_measures_its_own_contacts(unit_deg):
     assembly = assemble(model=Chords(math.radians(unit_deg)))
     assert assembly.clamped
     assert {(d.a, d.b) for d in assembly.matrix_differences} == {("P1", "P4"), ("P2", "P4")}
@@ -170,6 +167,6 @@ def test_a_contact_model_measures_its_own_contacts(unit_deg: float) -> None:
         ("P5", (0.0, 14.0, 0.0), "flat face"),
     ],
 )
-def test_surfaces_have_their_names(part, point, name) -> None:
+def test_surfaces_have_their_names(part, point, name):
     names = [surface.name for surface in surfaces_at(parts(load_clamp())[part], np.eye(4), np.array(point))]
     assert min(names, key=SURFACES.index) == name

@@ -1,7 +1,5 @@
 """Ways of the six parts among each other: the search's answers against brute force on a lattice."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

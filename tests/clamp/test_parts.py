@@ -1,7 +1,5 @@
 """Boxes of the parts as published, and their closed-form volumes against meshes whose error is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -21,7 +19,7 @@ CLAMP = load_clamp()
 REFERENCE = parts(CLAMP)
 
 
-def test_bolt_nut_and_wires_are_textbook_solids() -> None:
+def test_bolt_nut_and_wires_are_textbook_solids():
     hexagon = math.sqrt(3) / 2 * 30.0**2
     assert REFERENCE["P4"].volume == pytest.approx(math.pi * 100 * 160 + hexagon * 12.5, rel=1e-14)
     assert REFERENCE["P5"].volume == pytest.approx((hexagon - math.pi * 100) * 26.4, rel=1e-14)
@@ -29,7 +27,7 @@ def test_bolt_nut_and_wires_are_textbook_solids() -> None:
     assert REFERENCE["P7"].volume == pytest.approx(math.pi * (14.25 / 2) ** 2 * 180, rel=1e-14)
 
 
-def test_bounds_are_the_published_sizes() -> None:
+def test_bounds_are_the_published_sizes():
     corner = 30.0 / math.sqrt(3)
     expected = {
         "P1": [[0, -30, -27.7260], [137, 30, 0]],
@@ -46,7 +44,7 @@ def test_bounds_are_the_published_sizes() -> None:
 
 @pytest.mark.parametrize("mesh_error", [0.5, 1e-4])
 @pytest.mark.parametrize("name", PARTS)
-def test_mesh_is_closed_and_within_its_computed_volume_error(name: str, mesh_error: float) -> None:
+def test_mesh_is_closed_and_within_its_computed_volume_error(name, mesh_error):
     part = REFERENCE[name]
     solid = mesh(part, mesh_error)
     assert solid.is_watertight
@@ -66,7 +64,7 @@ def test_mesh_is_closed_and_within_its_computed_volume_error(name: str, mesh_err
 
 @settings(deadline=None, max_examples=15)
 @given(radius=st.floats(5.0, 25.0), depth=st.floats(-0.9, 0.95), gap=st.floats(0.0, 30.0), error=st.floats(1e-3, 2.0))
-def test_other_grooves_major_arcs_too_give_closed_meshes(radius: float, depth: float, gap: float, error: float) -> None:
+def test_other_grooves_major_arcs_too_give_closed_meshes(radius, depth, gap, error):
     """Depth is the centre below the face in radii: a negative one is an arc of more than 180 degrees."""
     groove = replace(
         CLAMP.up_splint.line_groove, radius=radius, offset=12.0 + radius + gap, centre_depth=60.0 + depth * radius
@@ -82,7 +80,7 @@ def test_other_grooves_major_arcs_too_give_closed_meshes(radius: float, depth: f
     assert low - 1e-7 <= solid.volume <= high + 1e-7
 
 
-def test_bad_values_say_what_is_wrong() -> None:
+def test_bad_values_say_what_is_wrong():
     for bad in (0.0, -1.0, math.nan, math.inf, 1e-7):
         with pytest.raises(InputError, match="mesh_error must be a finite length >= 1e-06 mm"):
             mesh(REFERENCE["P5"], bad)

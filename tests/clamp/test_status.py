@@ -1,7 +1,5 @@
 """One status in every command, and the seat of each wire as outlines measured by shapely say."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import math
@@ -15,10 +13,8 @@ import shapely
 from random_clamps import whole_clamp
 
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import placement
-from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.sensitivity import sensitivity
 from clamp3d.clamp.tolerance import monte_carlo
 from clamp3d.cli import main
@@ -31,7 +27,7 @@ TOUCH = 1e-6
 """Gap in mm up to which a wire touches; chords of an arc are nearer than it is, by as much."""
 
 
-def nearest_feature(run: Assembly, splint: str, wire: str) -> tuple[str, float]:
+def nearest_feature(run, splint, wire):
     """What of a splint's outline is nearest to a wire, and the gap; arcs are chords within 1e-6 mm."""
     profile = parts(run.clamp)[splint].bodies[0].profile
     radius = (run.clamp.line if wire == "P6" else run.clamp.jumper).radius
@@ -62,7 +58,7 @@ def nearest_feature(run: Assembly, splint: str, wire: str) -> tuple[str, float]:
 
 
 @pytest.mark.parametrize("k", range(COUNT))
-def test_a_random_clamp_has_one_status_and_the_seats_that_its_outlines_show(k: int) -> None:
+def test_a_random_clamp_has_one_status_and_the_seats_that_its_outlines_show(k):
     clamp = whole_clamp(np.random.default_rng([32, k]))
     try:
         run = assemble(clamp)
@@ -97,13 +93,13 @@ def test_a_random_clamp_has_one_status_and_the_seats_that_its_outlines_show(k: i
                 ask(clamp)
 
 
-def beside_the_groove() -> Clamp:
+def beside_the_groove():
     """The first random clamp that ends with a wire on a face."""
     rng = (whole_clamp(np.random.default_rng([32, k])) for k in itertools.count())
     return next(clamp for clamp in rng if "lies beside" in assemble(clamp).status)
 
 
-def test_a_wire_on_a_face_beside_the_groove_is_not_clamped_and_a_finding() -> None:
+def test_a_wire_on_a_face_beside_the_groove_is_not_clamped_and_a_finding():
     run = assemble(beside_the_groove())
     assert run.status.startswith("not clamped: P")
     assert "lies beside the" in run.status
@@ -112,7 +108,7 @@ def test_a_wire_on_a_face_beside_the_groove_is_not_clamped_and_a_finding() -> No
     assert {(d.declared, d.measured) for d in run.matrix_differences} & {(3, 2)}
 
 
-def test_a_wire_on_a_lip_is_clamped_with_a_warning() -> None:
+def test_a_wire_on_a_lip_is_clamped_with_a_warning():
     run = assemble(line=48, jumper=47.8)
     assert run.status == "clamped, but P6 on a lip of both splints' grooves and P7 on a lip of both splints' grooves"
     assert run.clamped
@@ -124,9 +120,7 @@ def test_a_wire_on_a_lip_is_clamped_with_a_warning() -> None:
     ("command", "wire", "code"),
     [*((name, "LJ-16", 1) for name in COMMANDS), *((name, None, 0) for name in COMMANDS[:4])],
 )
-def test_every_command_ends_with_the_same_exit_code(
-    command: str, wire: str | None, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
+def test_every_command_ends_with_the_same_exit_code(command, wire, code, tmp_path, monkeypatch, capsys):
     text = (Path(__file__).parents[2] / "clamp3d/clamp/data/reference.toml").read_text()
     if wire is not None:
         text = text.replace('"LJ-630"', f'"{wire}"').replace('"LJ-120"', f'"{wire}"')
@@ -143,8 +137,8 @@ def test_every_command_ends_with_the_same_exit_code(
         assert "not clamped: faces meet, P6 and P7 loose" in said.out + said.err
 
 
-def test_what_cannot_be_proven_is_code_4_in_every_command(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    def unproven(*_: object, **__: object) -> None:
+def test_what_cannot_be_proven_is_code_4_in_every_command(monkeypatch, capsys):
+    def unproven(*_, **__):
         raise SolverError("final state not proven")
 
     for module in ("assemble", "tolerance", "sensitivity"):

@@ -1,14 +1,11 @@
 """Measuring methods, in this process and in their own; verdicts, front, rows for what fails; tables, chart, command."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from claims import END, START, assembly_table, comparison_table, update
@@ -32,7 +29,7 @@ from clamp3d.errors import InputError
 QUICK = 0.01
 
 
-def _row(method: str, one: float, worst: float, setting: float | None = None) -> Measured:
+def _row(method, one, worst, setting=None):
     bands = tuple(Band(b, 40, 40, 0, 0) for b in (0.02, 1e-4, 1e-6))
     label = Method(method, setting).label
     return Measured(
@@ -40,7 +37,7 @@ def _row(method: str, one: float, worst: float, setting: float | None = None) ->
     )  # fmt: skip
 
 
-def test_cas_is_exact_to_rounding_and_never_wrong() -> None:
+def test_cas_is_exact_to_rounding_and_never_wrong():
     row = measure(Method("cas"), budget=QUICK)
     assert row.poses == 420
     assert row.worst_error < 1e-14
@@ -51,7 +48,7 @@ def test_cas_is_exact_to_rounding_and_never_wrong() -> None:
 
 
 @pytest.mark.parametrize("method", [Method("chords", 5.0), Method("wedges", 10.0), Method("mesh", 0.05)])
-def test_faceted_methods_err_by_their_chords_and_only_to_the_safe_side(method: Method) -> None:
+def test_faceted_methods_err_by_their_chords_and_only_to_the_safe_side(method):
     row = measure(method, budget=QUICK)
     angle = {"chords": 5.0, "wedges": 10.0, "mesh": 10.0}[method.family]
     limit = chord_error(math.radians(angle))
@@ -68,7 +65,7 @@ points = st.lists(
 
 
 @given(points)
-def test_front_is_what_nothing_beats(values: list[tuple[float, float]]) -> None:
+def test_front_is_what_nothing_beats(values):
     rows = [_row("mesh", one, worst) for one, worst in values]
     front = {(r.one, r.worst_error) for r in pareto(rows)}
     beaten = {p for p in values if any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in values)}
@@ -76,14 +73,14 @@ def test_front_is_what_nothing_beats(values: list[tuple[float, float]]) -> None:
     assert pareto([_row("chords", 1.0, 1.0)]) == []
 
 
-def test_a_job_answers_as_the_process_itself_would() -> None:
+def test_a_job_answers_as_the_process_itself_would():
     row = run_job("contact", Method("chords", 40.0), time_limit=60.0)
     here = dataclasses.asdict(measure(Method("chords", 40.0), budget=QUICK))
     for name in ("worst_error", "median_error", "depth_error", "pieces", "label"):
         assert getattr(row, name) == here[name]
 
 
-def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_that_fails_hangs_or_crashes_says_so(tmp_path, monkeypatch):
     with pytest.raises(JobError, match="unknown method 'fog'"):
         run_job("contact", Method("fog", 1.0), time_limit=60.0)
     with pytest.raises(JobError, match=re.escape("not finished in 0.2 s")):
@@ -102,7 +99,7 @@ SHALLOW = ("coal-cylinder", "coal-capsule", "fcl", EXACT[0])
 
 
 @pytest.mark.parametrize("family", SERIES)
-def test_every_series_measures_the_same_groove(family: str) -> None:
+def test_every_series_measures_the_same_groove(family):
     if family in missing_peers():
         pytest.skip(f"{family} is not installed")
     method = Method(family) if family in EXACT else Method(family, 5.0)
@@ -115,7 +112,7 @@ def test_every_series_measures_the_same_groove(family: str) -> None:
     assert row.bands[0].false_misses == 0
 
 
-def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
+def test_pages_say_what_the_figures_say(tmp_path):
     root = Path(__file__).parents[3]
     data = json.loads((root / "docs" / "compare.json").read_text())
     for page in ("README.md", "docs/methods.md"):
@@ -130,7 +127,7 @@ def test_pages_say_what_the_figures_say(tmp_path: Path) -> None:
         update(root / "LICENSE", "")
 
 
-def _comparison() -> Comparison:
+def _comparison():
     contact = (
         _row("cas", 2e-6, 3e-15),
         _row("chords", 4e-5, 0.01, 5.0),
@@ -150,7 +147,7 @@ def _comparison() -> Comparison:
 IMAGE = Imaged(10, 4.5, 4.0, 1.08, 7.1, (31.9, 31.1, 31.2, 30.9, 32.1), 0.006, 0.2)
 
 
-def test_a_picture_as_page_and_as_image(tmp_path: Path) -> None:
+def test_a_picture_as_page_and_as_image(tmp_path):
     save_comparison(_comparison(), tmp_path / "a.html", "clamp3d compare --plot a.html")
     page = (tmp_path / "a.html").read_text()
     assert not re.findall(r"(?:src|href)=[\"']https?:", page)
@@ -160,10 +157,10 @@ def test_a_picture_as_page_and_as_image(tmp_path: Path) -> None:
     assert (tmp_path / "b.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    jobs: list[tuple[str, str]] = []
+def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch):
+    jobs = []
 
-    def answer(kind: str, method: Method, *, time_limit: float) -> Any:
+    def answer(kind, method, *, time_limit):
         jobs.append((kind, method.family))
         if kind == "contact" and method.family == "hulls":
             raise JobError("crashed (SIGABRT)")
@@ -175,7 +172,7 @@ def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.
 
     monkeypatch.setattr(study, "run_job", answer)
     monkeypatch.setattr(study, "missing_peers", lambda: {"coal-sector": "not installed: pip install coal"})
-    steps: list[tuple[int, int]] = []
+    steps = []
     comparison = compare(peers=True, progress=lambda done, total, what: steps.append((done, total)))
     assert [row.label for row in comparison.contact] == [m.label for m in METHODS]
     assert {r.reason for r in comparison.contact if isinstance(r, NotMeasured)} == {"crashed (SIGABRT)"}
@@ -189,7 +186,7 @@ def test_compare_runs_every_job_and_goes_on_after_a_failure(monkeypatch: pytest.
     assert not any(kind == "peer" for kind, _ in jobs)
 
 
-def test_the_command_shows_every_row_and_why_one_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_shows_every_row_and_why_one_is_missing(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "compare", lambda **_: _comparison())
     arguments = ["--json", str(tmp_path / "a.json"), "--plot", str(tmp_path / "a.svg"), "--peers"]
     result = CliRunner().invoke(Compare, arguments, catch_exceptions=False)

@@ -1,7 +1,5 @@
 """The committed poses of the comparison: their distances by closed form, by search, and what each group promises."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 
@@ -12,7 +10,7 @@ from tests.kernel import oracle
 POSES = known_poses()
 
 
-def test_every_group_is_what_its_name_says() -> None:
+def test_every_group_is_what_its_name_says():
     assert len(POSES) == 420
     assert POSES.parallel.sum() == 210
     for T in POSES.T:
@@ -30,7 +28,7 @@ def test_every_group_is_what_its_name_says() -> None:
         assert (np.abs(of) > band / 2).any()
 
 
-def test_parallel_distances_are_the_closed_form_at_50_digits() -> None:
+def test_parallel_distances_are_the_closed_form_at_50_digits():
     """Centre inside the arc's sector: R - r - |centre|, the whole truth for a wire along the groove."""
     checked = 0
     with mpmath.workdps(50):
@@ -43,7 +41,7 @@ def test_parallel_distances_are_the_closed_form_at_50_digits() -> None:
     assert checked > 150
 
 
-def test_tilted_distances_are_those_of_the_search() -> None:
+def test_tilted_distances_are_those_of_the_search():
     for i in np.flatnonzero(~POSES.parallel)[::52]:
         c, d = oracle.axis_of(POSES.T[i])
         value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)
