@@ -11,11 +11,10 @@ from functools import cache
 import manifold3d
 import numpy as np
 
-from clamp3d.clamp.assemble import assemble
+from clamp3d import assemble, load_clamp
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts, wire_solid
-from clamp3d.geometry.meshing import mesh
+from clamp3d.shapes import mesh
 
 LATTICE = 5.0
 """Mm between points of the lattice: every part is thicker."""
@@ -108,12 +107,3 @@ def questions():
         for k in range(len(rest) + 1):
             for others in itertools.combinations(rest, k):
                 yield part, ("P6", *others)
-
-
-def possible(orders):
-    """The permutations of the six parts all of whose steps have a way; ``orders`` (part, others) -> bool."""
-    found = []
-    for order in itertools.permutations(MOVING):
-        if all(orders[part, ("P6", *sorted(order[:k]))] for k, part in enumerate(order)):
-            found.append(order)
-    return found

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from outlines import Outlines
 
-from clamp3d.baselines.cas import Cas
+from clamp3d import load_clamp
+from clamp3d.baselines import Cas
 from clamp3d.bench.stress.assemblies.clamps import Case
 from clamp3d.bench.stress.assemblies.family import EXACT, Assemblies, Rest, Truths
 from clamp3d.clamp.dimensions import Joints, Wire
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import D, Section
 from clamp3d.errors import SolverError
 

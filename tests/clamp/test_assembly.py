@@ -3,24 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.loader import load_clamp
-from clamp3d.errors import InputError
-
-
-@pytest.mark.parametrize("line", [16, 16.0, np.float64(16), np.float32(16), np.int64(16), np.array(16.0), "16"])
-def test_a_wire_is_a_number_or_a_name(line):
-    assert load_clamp(line=line).line.radius == 8.0
-
-
-@pytest.mark.parametrize("line", [0, -1.0, np.nan, np.inf, True, [16], "LJ-17", b"16"])
-def test_what_is_no_wire_is_named(line):
-    with pytest.raises(InputError) as caught:
-        load_clamp(line=line)
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).startswith(("line ", "unknown conductor "))
+from clamp3d import assemble, load_clamp
 
 
 def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path):

@@ -10,16 +10,15 @@ from orders import manifold
 from outlines import outline
 from scipy.spatial import cKDTree
 
-from clamp3d.baselines.cas import Cas
-from clamp3d.clamp.assemble import assemble
+from clamp3d import InputError, assemble, load_clamp, placement
+from clamp3d.baselines import Cas
 from clamp3d.clamp.capture import CaptureMap, Outcome, close_from
 from clamp3d.clamp.closing import open_start
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.placement import close_on, placement
+from clamp3d.clamp.placement import close_on
 from clamp3d.clamp.section import WIRES, Section
-from clamp3d.errors import InputError, NotClampedError
-from clamp3d.geometry.pose import rotation
+from clamp3d.errors import NotClampedError
+from clamp3d.kernel import rotation
 from clamp3d.output.placement_report import capture_figure
 
 COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "16"))

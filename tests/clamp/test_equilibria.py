@@ -3,19 +3,15 @@
 import json
 import math
 
-import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from clamp3d import assemble, load_clamp
-from clamp3d.baselines.cas import Cas
+from clamp3d import assemble
+from clamp3d.baselines import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
-from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import Section
-from clamp3d.cli import group
 from clamp3d.output.run_report import run_to_text
 
 
@@ -52,24 +48,6 @@ def test_a_lip_holds_nothing_beside_the_face_that_a_wire_lies_on():
         assert envelope.falls(state.q) <= 1e-8
 
 
-def test_a_symmetric_clamp_has_its_equilibria_in_mirrored_pairs():
-    clamp = clamp_of(15.0, math.pi / 3, np.array([48.0, 48.0, 40.0, 40.0]), 24.0)
-    assert clamp is not None
-    states = equilibria(Section(clamp, Cas()))
-    found = sorted((round(float(s.q[4]), 6), round(float(s.q[5]), 6) + 0.0) for s in states)
-    assert sorted((d, -tilt + 0.0) for d, tilt in found) == found
-
-
-def test_every_equilibrium_is_proven_and_holds_when_closed_again():
-    section = Section(load_clamp(line="LJ-500", jumper="LJ-400"), Cas())
-    for state in equilibria(section):
-        assert max(state.violation, state.optimality) <= TOLERANCE
-        assert section.gaps(state.q).value.min() >= -TOLERANCE
-        opened = state.q + 1e-3 * np.array([0.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        if section.gaps(opened).value.min() >= 0.0:
-            assert solve_final_state(section, opened, stride=1e-4).q[4:] == pytest.approx(state.q[4:], abs=1e-8)
-
-
 def test_a_run_tells_the_others_when_asked():
     run = assemble("reference", Cas(), others=True)
     assert assemble("reference", Cas()).others is None
@@ -84,15 +62,11 @@ def test_a_run_tells_the_others_when_asked():
     assert len(run.to_dict()["other_ends"]) == len(run.others)
 
 
-def test_command_line_tells_them_unless_told_not_to(tmp_path):
-    out = tmp_path / "run.json"
-    asked = CliRunner().invoke(group, ["run", "--quiet", "--json", str(out)])
-    assert asked.exit_code == 0
-    assert "another equilibrium: 31.638 mm, tilt 12.33 deg: jumper on the face of the up splint" in asked.output
-    ends = json.loads(out.read_text())["other_ends"]
-    assert [round(e["distance_mm"], 3) for e in ends] == [31.638]
-    plain = CliRunner().invoke(group, ["run", "--quiet", "--no-equilibria"])
-    assert "also ends" not in plain.output
-    refused = CliRunner().invoke(group, ["run", "--quiet", "--solver", "stepped", "--equilibria"])
-    assert refused.exit_code == 2
-    assert "--equilibria goes with --solver exact, not stepped" in refused.output
+def test_command_line_tells_them_unless_told_not_to(main):
+    code, out, text = main("run", "--json", "-")
+    assert code == 0
+    assert "another equilibrium: 31.638 mm, tilt 12.33 deg: jumper on the face of the up splint" in text
+    assert [round(e["distance_mm"], 3) for e in json.loads(out)["other_ends"]] == [31.638]
+    assert "another equilibrium" not in main("run", "--quiet", "--no-equilibria")[1]
+    code, _, error = main("run", "--quiet", "--solver", "stepped", "--equilibria")
+    assert (code, "--equilibria goes with --solver exact, not stepped" in error) == (2, True)

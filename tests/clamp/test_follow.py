@@ -9,11 +9,10 @@ import pytest
 from orders import manifold
 from random_clamps import whole_clamp
 
-from clamp3d.baselines.cas import Cas
-from clamp3d.clamp.assemble import assemble
+from clamp3d import assemble, load_clamp
+from clamp3d.baselines import Cas
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.ways import Insertion

@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.errors import InputError
-from clamp3d.geometry.meshing import mesh, volume_bounds
-from clamp3d.geometry.profile import Arc, Profile
+from clamp3d.geometry.meshing import volume_bounds
+from clamp3d.shapes import mesh
 
 CLAMP = load_clamp()
 REFERENCE = parts(CLAMP)
@@ -87,7 +86,3 @@ def test_bad_values_say_what_is_wrong():
     short = replace(CLAMP, up_splint=replace(CLAMP.up_splint, length=20.0))
     with pytest.raises(InputError, match=r"up_splint.hole_diameter must be < the part's length = 20 mm, got 22"):
         parts(short)
-    with pytest.raises(InputError, match="outline must be closed"):
-        Profile((Arc((0, 0), 1, 0, math.pi),))
-    with pytest.raises(InputError, match="counter-clockwise"):
-        Profile.of((0.0, 0.0), (0.0, 1.0), (1.0, 0.0))

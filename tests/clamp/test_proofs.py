@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from clamp3d.baselines.cas import Cas
+from clamp3d import load_clamp
+from clamp3d.baselines import Cas
 from clamp3d.clamp import final_state
 from clamp3d.clamp.equilibria import same
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.path import meetings
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.section import D, Section
 from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SolverError
-from clamp3d.geometry.pose import SectionPose
+from clamp3d.kernel import SectionPose
 
 
 @pytest.fixture(scope="module")

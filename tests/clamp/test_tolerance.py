@@ -1,17 +1,13 @@
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
-from clamp3d.baselines.cas import Cas
+from clamp3d import InputError, load_clamp, monte_carlo, sensitivity
+from clamp3d.baselines import Cas
 from clamp3d.clamp import tolerance as montecarlo
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.section import Section
-from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, sensitivity, with_dimensions
-from clamp3d.clamp.tolerance import monte_carlo
-from clamp3d.errors import InputError, SolverError
+from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
+from clamp3d.errors import SolverError
 
 
 def _distance(clamp, near):
@@ -90,12 +86,11 @@ def test_bad_settings(settings, match):
         monte_carlo(load_clamp(), **settings)
 
 
-def test_an_address_without_a_scheduler_is_one_line():
+def test_an_address_without_a_scheduler_is_one_line(main):
     pytest.importorskip("distributed")
-    line = [sys.executable, "-m", "clamp3d", "tolerance", "--n", "2", "--scheduler", "x"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"
+    code, _, error = main("tolerance", "--n", "2", "--scheduler", "x")
+    assert code == 2
+    assert error == "clamp3d: error: no Dask scheduler at 'x': missing port number in address 'x'\n"
 
 
 def test_a_cluster_without_workers_is_said_to_have_none(monkeypatch):
