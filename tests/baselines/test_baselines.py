@@ -6,21 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clamp3d.baselines.cas import Cas
-from clamp3d.baselines.chords import Chords
+from clamp3d import Cylinder, InputError, assemble, load_clamp
+from clamp3d.baselines import Cas, Chords, Hulls, Meshes, Wedges
 from clamp3d.baselines.decomposition import DecompositionParameters
-from clamp3d.baselines.hulls import Hulls
-from clamp3d.baselines.polytopes import Meshes
-from clamp3d.baselines.wedges import Wedges
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.errors import InputError
-from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.pose import inverse, rotation, translation
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.pose import inverse
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import SweptArc, mesh
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from clamp3d import InputError
 from clamp3d.baselines.decomposition import DecompositionParameters, cache_dir, decompose
 from clamp3d.bench.compare.scene import grooved_block
-from clamp3d.errors import InputError, SolverError
-from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.primitives import SweptArc
+from clamp3d.errors import SolverError
+from clamp3d.shapes import SweptArc, mesh
 
 BLOCK = grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, depth=30.0)
 COARSE = DecompositionParameters(threshold=0.05, real_metric=False)

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d import baselines
+from clamp3d import Cylinder, InputError, baselines
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.errors import InputError
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.shapes import SweptArc
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))

@@ -8,11 +8,10 @@ import trimesh
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from clamp3d import Cylinder, InputError
 from clamp3d.baselines.fcl_shapes import Wire, bvh, contained, convex, distance, facets, measure
 from clamp3d.baselines.wedges import prism
-from clamp3d.errors import InputError
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Cylinder
+from clamp3d.kernel import rotation, translation
 
 V = prism(np.array([[-20.0, -10.0], [20.0, -10.0], [20.0, 10.0], [-20.0, 10.0]]), -25.0, 25.0)
 BOX, MESH = convex(V), bvh(trimesh.convex.convex_hull(V))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clamp3d.errors import InputError
+from clamp3d import InputError
 from clamp3d.geometry.mesh import closed_mesh
 
 V = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 4.0)])

@@ -8,14 +8,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clamp3d import InputError, load_clamp
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import grooved_block
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.errors import InputError
-from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Arc
+from clamp3d.shapes import SweptArc
 
 
 def assert_filled_once(wedges, outline):

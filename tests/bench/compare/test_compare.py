@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from clamp3d import InputError
 from clamp3d.bench.compare import run as study
 from clamp3d.bench.compare.assemblies import Assembled, Imaged
 from clamp3d.bench.compare.chart import save_comparison
@@ -24,7 +25,6 @@ from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compar
 from clamp3d.bench.compare.scene import chord_error
 from clamp3d.bench.machine import machine
 from clamp3d.cli.bench import Compare
-from clamp3d.errors import InputError
 
 QUICK = 0.01
 

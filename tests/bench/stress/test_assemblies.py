@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d.baselines.cas import Cas
+from clamp3d.baselines import Cas
 from clamp3d.bench.stress.assemblies.clamps import clamp_of, random_clamp
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT

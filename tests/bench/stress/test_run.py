@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clamp3d import InputError
 from clamp3d.bench.stress.outcome import judge
-from clamp3d.bench.stress.poses.cases import Cases, Shapes
+from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
-from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, point_sdf, truth, truth_50_digits
+from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
 from clamp3d.bench.stress.run import KINDS, run_family, run_stress
 from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
 from clamp3d.cli import group
-from clamp3d.errors import InputError
 
 CASES = 250 if EXTENDED_WORKS else 50  # the campaigns of docs/methods.md have 100 000
 
@@ -36,46 +36,6 @@ def test_flat_ends_are_never_wrong_and_never_beyond_their_bound(family):
     (outcome,), difference = run_family(family, ["cas"], 70, 20, 60.0, 1)
     assert difference <= FLATS[family].truth_error
     assert (outcome.answered, outcome.wrong, outcome.beyond_bound) == (70, 0, 0), outcome.examples
-
-
-@pytest.mark.skipif(not EXTENDED_WORKS, reason="the quick truth needs 80-bit floats")
-@pytest.mark.parametrize("family", POSES)
-def test_no_point_of_the_axis_is_lower_than_the_truth(family):
-    """Against plain sampling, which knows neither slopes nor stretches; between samples a distance has slope 1."""
-    cases = POSES[family].cases(60, 11)
-    s, k = cases.shapes, cases.shape
-    R, a, H, r, half = (np.asarray(v, np.longdouble)[k, None] for v in (s.R, s.half_angle, s.L / 2, s.r, s.length / 2))
-    T = np.asarray(cases.T_groove_wire, np.longdouble)
-    axis = T[:, :3, 2] / np.sqrt((T[:, :3, 2] ** 2).sum(1))[:, None]
-    rng = np.random.default_rng(1)
-    t = np.sort(np.concatenate([half * rng.uniform(-1, 1, (60, 1999)), -half, half], 1), axis=1)
-    x, y, z = (T[:, i, 3, None] + t * axis[:, i, None] for i in range(3))
-    sampled = point_sdf(x, y, z, R, R * np.sin(a), -R * np.cos(a), H) - r
-    exact, rounding = truth(cases), EXTENDED_ERROR * cases.scene()
-    assert (exact <= sampled.min(1) + rounding).all()
-    assert (exact >= sampled.min(1) - np.diff(t).max(1) / 2 - rounding).all()
-
-
-# A wire r 6.935 in a groove of R 7: hand-made answers.
-@pytest.mark.parametrize(
-    ("offset", "tilt", "half_angle", "gap"),
-    [
-        (0.05, 0.0, 1.0, 0.015),
-        (0.065, 0.0, 1.0, 0.0),
-        (0.0650001, 0.0, 1.0, -1e-7),
-        (0.0, np.radians(0.148915009), np.pi / 2, 0.0),  # 7 - (25 tan t + 6.935 / cos t)
-        (-10.0, 0.0, np.pi / 2, 10.0 - 0.0 + np.hypot(0, 0) - 6.935 + np.hypot(7, 10) - 10.0),
-    ],
-)
-def test_truth_of_known_cases(offset, tilt, half_angle, gap):
-    one = np.ones(1)
-    shapes = Shapes(7.0 * one, half_angle * one, 50.0 * one, 6.935 * one, 200.0 * one)
-    T = np.eye(4)
-    T[:3, :3] = [[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]]
-    T[1, 3] = -offset
-    cases = Cases(shapes, np.zeros(1, int), T[None], np.array([np.nan]))
-    assert float(truth(cases)[0]) == pytest.approx(gap, abs=2e-8 if tilt else 1e-14)
-    assert float(truth_50_digits(cases, 0)) == pytest.approx(float(truth(cases)[0]), abs=1e-15)
 
 
 def test_no_minimum_of_a_long_thin_groove_is_missed():
