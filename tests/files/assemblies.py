@@ -84,20 +84,6 @@ def taper():
             "seal": moved(ring(9.0, 1.5), shift(-30, 0, 0))}  # fmt: skip
 
 
-def bearing():
-    """A deep groove ball bearing of bd_warehouse on a shaft, in a housing."""
-    from bd_warehouse.bearing import SingleRowDeepGrooveBallBearing
-
-    made = SingleRowDeepGrooveBallBearing(size="M8-22-7", bearing_type="SKT")
-    parts = {}
-    for k, solid in enumerate(explore(made.wrapped, "SOLID")):
-        parts[f"part_{k}"] = solid
-    low, high = -10.0, 10.0
-    parts["shaft"] = rod(4.0, low, high)
-    parts["housing"] = cut(box((-16, -16, low), (16, 16, high)), rod(11.0, low - 1, high + 1))
-    return parts
-
-
 def gears():
     """Two spur gears of bd_warehouse with flanks that touch; a shaft in each."""
     from bd_warehouse.gear import SpurGear
@@ -251,4 +237,4 @@ def from_shell(solid):
     return distance
 
 
-ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, bearing, gears)}
+ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, gears)}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.cad import Tree, block, cut, rod
+from tests.cad import Tree, block, cut, random_pose, rod
 
 
 def plate():
@@ -11,15 +11,6 @@ def plate():
 
 def pin():
     return rod(2.5, 0, 10)
-
-
-def pose(rng):
-    from scipy.spatial.transform import Rotation
-
-    T = np.eye(4)
-    T[:3, :3] = Rotation.random(rng=rng).as_matrix()
-    T[:3, 3] = rng.uniform(-50, 50, 3)
-    return T
 
 
 def nested(rng):
@@ -31,7 +22,7 @@ def nested(rng):
         tree.product("plate", plate()),
         tree.product("pin: 5 x 10", pin()),
     )
-    a, b, c, d, e = (pose(rng) for _ in range(5))
+    a, b, c, d, e = (random_pose(rng) for _ in range(5))
     tree.put(root, sub, a)
     tree.put(sub, plates, b)
     tree.put(sub, pins, c)

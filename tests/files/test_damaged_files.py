@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import InputError, check, load
+from clamp3d import InputError, load
 from clamp3d.files.bodies import unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
@@ -237,18 +237,6 @@ def test_a_robot_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     count = -1 if text == "robot" else 1
     (folder / "arm.urdf").write_text(ROBOT.replace(text, instead, count))
     refused(folder / "arm.urdf", message)
-
-
-def test_balls_of_twelve_millimetres_are_measured(tmp_path):
-    pytest.importorskip("yourdfpy")
-    (tmp_path / "arm.urdf").write_text(ROBOT)
-    scene = load(tmp_path / "arm.urdf")
-    assert [part.name for part in scene.parts] == ["base", "tip", "end"]
-    result = check(scene)
-    assert set(result.counts) <= {"clear", "clash", "allowed"}
-    (pair,) = (pair for pair in result.pairs if {pair.a, pair.b} == {"tip", "end"})
-    apart = float(np.hypot(10.0, 20.0)) - 24.0  # two balls in each other by 1.64 mm
-    assert pair.distance.lower <= apart <= pair.distance.upper
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")

@@ -46,12 +46,12 @@ def test_shapes_of_open_cascade_and_of_cadquery():
     pytest.importorskip("OCP")
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-    from tests.cad import location
-    from tests.files.step_scenes import pin, plate, pose
+    from tests.cad import location, random_pose
+    from tests.files.step_scenes import pin, plate
 
     assert volumes(load(BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
     # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.
-    T, S = pose(np.random.default_rng(1)), pose(np.random.default_rng(2))
+    T, S = random_pose(np.random.default_rng(1)), random_pose(np.random.default_rng(2))
     held = SimpleNamespace(wrapped=pin())
     stack = SimpleNamespace(vals=lambda: [held, SimpleNamespace(wrapped=plate())])
     assert [p.name for p in load(stack).parts] == ["part_1", "part_2"]

@@ -15,12 +15,12 @@ from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_StepModelType
 from OCP.TopoDS import TopoDS_Compound
 
-from clamp3d import InputError, export, load
+from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
 from clamp3d.files.open_cascade import explore
 from clamp3d.geometry.shells import volume
-from tests.cad import Tree, location
-from tests.files.step_scenes import nested, pin, plate, pose
+from tests.cad import Tree, location, random_pose
+from tests.files.step_scenes import nested, pin, plate
 
 
 @pytest.fixture(scope="module")
@@ -42,23 +42,12 @@ def test_names_places_and_volumes_of_a_tree(written):
         assert abs(volume(mesh.vertices, mesh.faces) - size) < area
 
 
-def test_an_assembly_is_written_as_it_was_read(written, tmp_path):
-    scene, _ = written
-    again = load(export(scene, tmp_path / "again.step").files[0])
-    assert [part.name for part in again.parts] == [part.name for part in scene.parts]
-    for part, other in zip(scene.parts, again.parts, strict=True):
-        np.testing.assert_allclose(other.T_world, part.T_world, atol=1e-6)
-        sizes = [volume(shape.mesh.vertices, shape.mesh.faces) for shape in (other.shape, part.shape)]
-        assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
-    assert len({id(part.shape) for part in again.parts}) == len({id(part.shape) for part in scene.parts})
-
-
 def test_several_solids_of_one_product_are_several_parts(tmp_path):
     both = TopoDS_Compound()
     builder = BRep_Builder()
     builder.MakeCompound(both)
     builder.Add(both, plate())
-    T = pose(np.random.default_rng(3))
+    T = random_pose(np.random.default_rng(3))
     builder.Add(both, pin().Moved(location(T)))
     tree = Tree()
     tree.product("welded", both)
@@ -70,7 +59,7 @@ def test_what_has_no_name_is_called_after_what_holds_it_and_names_need_not_be_ut
     tree = Tree()
     root, blank = tree.product("top"), tree.product(" ", pin())
     tree.put(root, blank, np.eye(4), name="=>[0:1:1:2]")  # as Open CASCADE names an instance that nobody named
-    tree.put(root, tree.product("PARTNAME", plate()), pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
+    tree.put(root, tree.product("PARTNAME", plate()), random_pose(np.random.default_rng(5)), name="=>[0:1:1:3]")
     path = tree.write(tmp_path / "blank.step")
     path.write_bytes(path.read_bytes().replace(b"PARTNAME", "Bügel".encode("latin-1")))
     assert [part.name for part in load(path).parts] == ["top", "Bügel"]
@@ -139,31 +128,6 @@ def test_a_text_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     else:
         with pytest.raises(InputError, match=message):
             load(path)
-
-
-def test_coloured_and_layered_faces_are_read(tmp_path):
-    """Colours and layers put labels without a name below a part."""
-    from OCP.Quantity import Quantity_Color, Quantity_NameOfColor
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
-
-    tree = Tree()
-    box = BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape()
-    label = tree.product("box", box)
-    face = tree.tool.AddSubShape(label, TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_FACE).Current())
-    for item, colour in ((face, "Quantity_NOC_RED"), (label, "Quantity_NOC_BLUE")):
-        XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main()).SetColor(
-            item, Quantity_Color(getattr(Quantity_NameOfColor, colour)), XCAFDoc_ColorType.XCAFDoc_ColorSurf
-        )
-    XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main()).SetLayer(label, TCollection_ExtendedString("outer"))
-    scene = load(tree.write(tmp_path / "coloured.step"))
-    assert [part.name for part in scene.parts] == ["box"]
-    component = scene.parts[0].component
-    assert (component.colour, component.face_colours) == ("#0000FF", {0: "#FF0000"})
-    mesh = scene.parts[0].shape.mesh
-    assert volume(mesh.vertices, mesh.faces) == pytest.approx(1000.0)
 
 
 @pytest.fixture

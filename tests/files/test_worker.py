@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from clamp3d.errors import InputError, SolverError
+from clamp3d import InputError
+from clamp3d.errors import SolverError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.files.worker import process
 

@@ -17,7 +17,8 @@ from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from clamp3d import check, export, load
 from clamp3d.kernel import translation
-from tests.files.step_scenes import Tree, pin, plate, pose
+from tests.cad import Tree, random_pose
+from tests.files.step_scenes import pin, plate
 from tests.output.step_reader import children, read_step
 
 RED, GREEN, BLUE = "#FF0000", "#00FF00", "#0000FF"
@@ -44,18 +45,18 @@ def coloured(path):
         Quantity_Color.ColorFromHex_s(hexadecimal, colour)
         colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
 
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(8)
     root, sub = tree.product("machine"), tree.product("sub, assembly")
     body = plate()
     plates, pins = tree.product("plate", body), tree.product("pin", pin())
     paint(pins, GREEN)
     paint(tree.tool.AddSubShape(plates, TopExp_Explorer(body, TopAbs_ShapeEnum.TopAbs_FACE).Current()), RED)
-    tree.put(sub, plates, pose(rng), "plate")
-    tree.put(sub, pins, pose(rng), "pin")
-    tree.put(root, sub, pose(rng), "left")
-    tree.put(root, sub, pose(rng), "right")
-    tree.put(root, pins, pose(rng), "loose")
-    tree.put(root, pins, pose(rng), "blue one")
+    tree.put(sub, plates, random_pose(rng), "plate")
+    tree.put(sub, pins, random_pose(rng), "pin")
+    tree.put(root, sub, random_pose(rng), "left")
+    tree.put(root, sub, random_pose(rng), "right")
+    tree.put(root, pins, random_pose(rng), "loose")
+    tree.put(root, pins, random_pose(rng), "blue one")
     paint(list(children(root))[-1], BLUE)
     layers = XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main())
     layers.SetLayer(plates, TCollection_ExtendedString("outer"))
