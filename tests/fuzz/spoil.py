@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import clamp3d
-from clamp3d.kernel import rotation
+from tests.kinds import poses
 
 NUMBERS = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 1e-12, 99999.99999, 1e12, 1e154, math.pi, 90.0, 180.0])
 _TEXT = "nan|1e400|0x10|mm|P1|P9|-1|--|*|[|1,2|a:b|%s%n{}{0}|[bold]x[/bold]|C:\\x|../../etc/passwd|| "
@@ -104,20 +104,9 @@ def spoil_bytes(draw, content):
 
 
 @st.composite
-def rigid(draw, reach=20.0):
-    """A rigid pose; a quarter turn in one of three."""
-    axis = draw(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda x: np.linalg.norm(x) > 1e-3))
-    T = rotation(axis, draw(st.floats(-math.pi, math.pi)))
-    if pick(draw, True, False, False):
-        T = rotation(pick(draw, [1, 0, 0], [0, 1, 0], [0, 0, 1]), math.pi / 2).round()
-    T[:3, 3] = draw(st.tuples(*[st.floats(-reach, reach)] * 3))
-    return T
-
-
-@st.composite
 def any_pose(draw):
     """A pose in some type and layout, one in three no pose any more, or just not quite."""
-    T = draw(rigid())
+    T = draw(poses(20.0))
     if pick(draw, True, True, False):
         return pick(draw, lambda T: T, np.asfortranarray, np.ndarray.tolist, lambda T: T.astype(">f8"))(T)
     T[draw(st.integers(0, 3)), draw(st.integers(0, 3))] += pick(draw, 0.0, draw(NUMBERS))

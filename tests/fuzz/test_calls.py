@@ -18,7 +18,8 @@ from clamp3d import cli, kernel, shapes
 from clamp3d.errors import Clamp3dError
 from tests.fuzz.rules import OLD, assert_outputs, call, examples, new_folder
 from tests.fuzz.samples import SCENE, TETRA
-from tests.fuzz.spoil import ANYTHING, any_pose, near, pick, rigid
+from tests.fuzz.spoil import ANYTHING, any_pose, near, pick
+from tests.kinds import poses
 
 _INFINITE = {"curvature", "gap_left", "gap_right", "gap", "high", "least", "lower", "opening", "upper", "uncertainty"}
 """Fields whose documented value is infinite where there is none."""
@@ -34,7 +35,7 @@ FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 BOX, BLOCK = shapes.box((1, 2, 3)), shapes.groove_block(kernel.SweptArc(7.0, 1.0, 50.0), 40.0, 20.0)
 BLOCK_AND_WIRE = clamp3d.Scene(clearance=0.5).add("block", BLOCK).add("wire", shapes.cylinder(6.5, 80.0))
 WAY = {"a": GROOVES, "b": WIRES, "motion": MOTIONS, "T_a_b": kernel.translation(0.0, 40.0, 0.0)}
-POSES = st.lists(rigid(), max_size=5).map(lambda some: np.array(some).reshape(-1, 4, 4)) | any_pose()
+POSES = st.lists(poses(20.0), max_size=5).map(lambda some: np.array(some).reshape(-1, 4, 4)) | any_pose()
 TARGETS = [
     (kernel.signed_distance, {"groove": GROOVES, "cylinder": WIRES, "pose": any_pose()}),
     (kernel.signed_distances, {"groove": GROOVES, "cylinder": WIRES, "poses": POSES}),
@@ -45,9 +46,9 @@ TARGETS = [
     (shapes.groove_block, {"groove": GROOVES, "width": SIZES.map(lambda s: 9 * s), "height": SIZES}),
     (BLOCK_AND_WIRE.add, {"part": "a", "shape": BOX, "T_world": any_pose()}),
     (clamp3d.Motion.screw, {"parts": "wire", "axis": THREE, "angle": st.floats(-4.0, 4.0), "point": THREE}),
-    (clamp3d.check, {"scene": rigid().map(lambda T: BLOCK_AND_WIRE.moved({"wire": T}))}),
+    (clamp3d.check, {"scene": poses(20.0).map(lambda T: BLOCK_AND_WIRE.moved({"wire": T}))}),
     (clamp3d.check_poses, {"scene": BLOCK_AND_WIRE, "part": "wire", "poses": POSES}),
-    (clamp3d.distance, {"a": BLOCK, "b": BOX, "T_a_b": rigid()}),
+    (clamp3d.distance, {"a": BLOCK, "b": BOX, "T_a_b": poses(20.0)}),
 ]
 """What is called, and its arguments or strategies for them; what has a default and is not named gets that."""
 
