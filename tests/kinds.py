@@ -11,11 +11,9 @@ from clamp3d.engine.check import check
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry import shapes
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.mesh import make_mesh
-from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Profile
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import SweptArc, make_mesh, mesh
 
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 """A pose that nothing is square to."""

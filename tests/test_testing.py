@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clamp3d import distance, first_contact, min_clearance, shapes
-from clamp3d.clamp.loader import load_clamp
+from clamp3d import Cylinder, Distance, Motion, distance, first_contact, load_clamp, min_clearance, shapes
 from clamp3d.clamp.parts import parts
-from clamp3d.engine.answer import Distance
 from clamp3d.geometry.meshing import chord_error
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import inverse, rotation, translation
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.pose import inverse
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import SweptArc
 from clamp3d.testing import (
     Body,
     assert_distance,
