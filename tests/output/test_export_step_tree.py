@@ -79,6 +79,7 @@ def test_tree_names_colours_and_instances_stay(machine, tmp_path):
     assert [leaf.colour for leaf in after] == [own, GREEN, own, GREEN, GREEN, BLUE]
     assert [leaf.face_colours for leaf in after] == [[RED], [], [RED], [], [], []]
     assert len({leaf.solid for leaf in after}) == len({leaf.solid for leaf in before}) == 2
+    assert scene.parts[0].component.face_colours == {0: RED}  # of the first face, as painted
     assert [part.name for part in load(tmp_path / "again.step").parts] == [part.name for part in scene.parts]
 
 
