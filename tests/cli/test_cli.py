@@ -50,6 +50,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
     assert "not clamped: faces meet" in out
 
 
+@pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop")  # when meshcat is imported
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -65,6 +66,25 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["run", "--json"], "requires an argument"),
         (["check", "a.urdf", "--joints", "elbow"], "must read like elbow=1.57,slide=20, got 'elbow'"),
         (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
+        (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
+        (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
+        (["view", "--url", "localhost:6000"], "zmq_url"),
+        (["view", "--url", "tcp://127.0.0.1:1", "--port", "7000"], "--port and --timeout"),
+        (["view", "--html", "x.html", "--open"], "--open"),
+        (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
+        (["view", "--draw-error", "-1", "--timeout", "0"], "mesh_error"),
+        (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
+        (["view", "bearing.stpe"], "; did you mean .stp?"),
+        (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),
+        (["report"], "--output"),
+        (["report", "-q", "-o", "x", "--clearance", "-1"], "clearance"),
+        (["report", "-q", "-o", "x", "nobody"], "nobody"),
+        (["report", "-q", "-o", "boxes.toml/x"], "boxes.toml"),
+        (["report", "boxes.toml", "--method", "chords", "-o", "x"], "go with a clamp"),
+        (["export", "-q", "-o", "x.stl", "--state", "P9"], "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1)"),
+        (["export", "-o", "x.stl", "--mesh-error", "wide"], "must be a finite number or a fraction like 1/3, got"),
+        (["export", "-f", "dwg", "-o", "x"], "'dwg' is not one of"),
+        (["export", "-f", "stl", "-o", "x", "nowhere.toml"], "nowhere.toml"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main, tmp_path, monkeypatch):
@@ -73,6 +93,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main, tmp_pat
     code, out, err = main(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
+    assert [path.name for path in tmp_path.iterdir()] == ["boxes.toml"]
 
 
 def test_every_file_option_writes_to_stdout_for_a_dash():

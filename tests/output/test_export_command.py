@@ -42,23 +42,6 @@ def test_scenes_and_meshes_are_exported_too(main, tmp_path: Path) -> None:
     assert out.split() == [str(tmp_path / f"final.step{s}") for s in ("", ".manifest.json")]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--state", "P9"), "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1), P7 (or 2)"),
-        (("--mesh-error", "wide"), "must be a finite number or a fraction like 1/3, got 'wide'"),
-        (("--format", "dwg"), "'dwg' is not one of"),
-        (("nowhere.toml",), "nowhere.toml"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(main, tmp_path: Path, arguments, message: str) -> None:
-    code, out, err = main("export", "--format", "stl", "--output", tmp_path / "out", *arguments)
-    assert (code, out) == (2, "")
-    assert message in err.splitlines()[-1]
-    assert "Traceback" not in err
-    assert not (tmp_path / "out").exists()
-
-
 def test_review_set_is_what_a_new_build_gives() -> None:
     done = subprocess.run(
         [sys.executable, str(ROOT / "scripts" / "build-meshes"), "--check"],

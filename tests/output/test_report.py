@@ -215,23 +215,3 @@ def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, no_pictures, mai
     assert [(p["a"], p["b"], p["verdict"]) for p in data["pairs"]] == [("a", "b", "clash")]
     assert main("report", ROOT / "examples" / "hinge" / "pin.stl", "-q", "-o", "pin")[0] == 0
     assert "mesh pin.stl of 216 triangles" in (tmp_path / "pin" / "report.html").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((), "--output"),
-        (("-o", "x", "--clearance", "-1"), "clearance"),
-        (("-o", "x", "nobody"), "nobody"),
-        (("-o", "file/x"), "file"),
-        ((str(ROOT / "examples/hinge/scene.toml"), "--method", "chords", "-o", "x"), "go with a clamp"),
-    ],
-)
-def test_bad_input_is_one_line_and_writes_nothing(arguments, message, tmp_path, monkeypatch, main):
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.chdir(tmp_path)
-    code, _, err = main("report", *arguments, "-q")
-    assert code == 2
-    assert message in err
-    assert len(err.strip().splitlines()) == 1
-    assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -407,27 +407,3 @@ def test_a_blocked_sequence_is_shown_on_one_page(tmp_path, main):
     assert said.startswith("not assembled: sequence step 3, P7")
     assert sum(line.startswith("http://") for line in shown) == 1
     assert "P7 from" in page.read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["view", "--url", "localhost:6000"], "zmq_url"),
-        (["view", "--url", "tcp://127.0.0.1:1", "--port", "7000"], "--port and --timeout"),
-        (["view", "--html", "x.html", "--open"], "--open"),
-        (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
-        (["view", "--draw-error", "-1", "--timeout", "0"], "mesh_error"),
-        (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
-        (["view", "bearing.stpe"], "; did you mean .stp?"),
-        (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
-        (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
-        (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),
-    ],
-)
-def test_bad_options_are_one_line(arguments, message, tmp_path, monkeypatch, main):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = main(*arguments)
-    assert code == 2
-    assert message in err
-    assert len(err.strip().splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
