@@ -79,6 +79,7 @@ def test_the_unit_of_a_mesh(tmp_path):
             "text.md: unknown kind of file; built in: reference; or give a clamp or scene file (.toml), a folder, or",
         ),
         ("bad.toml", {}, "bad.toml: not valid TOML: "),
+        ("none.toml", {}, "none.toml: the scene has no parts; add [parts.NAME], include or [clamp]"),
         ("folder", {}, "folder: no geometry file in the folder; read are .stl, .obj"),
         ("scene.toml", {"line": "LJ-500"}, "line goes with a clamp, not with scene.toml"),
         ("cube.stl", {"jumper": "16"}, "jumper goes with a clamp, not with cube.stl"),
@@ -89,20 +90,13 @@ def test_the_unit_of_a_mesh(tmp_path):
 )
 def test_anything_else_is_one_clear_line(source, options, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name, text in {"empty.toml": "", "text.md": "A *text*", "bad.toml": "a = ", "scene.toml": "[clamp]"}.items():
-        Path(name).write_text(text)
+    texts = {"empty": "", "bad": "a = ", "scene": "[clamp]", "none": "contact = 0.01\n[parts]\n"}
+    for name, text in texts.items():
+        Path(f"{name}.toml").write_text(text)
+    Path("text.md").write_text("A *text*")
     Path("folder").mkdir()
     trimesh.creation.box((1.0, 1.0, 1.0)).export("cube.stl")
     with pytest.raises(InputError) as error:
         load(source, **options)
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
-
-
-def test_a_scene_without_parts_is_refused(tmp_path):
-    file = tmp_path / "nothing.toml"
-    file.write_text("contact = 0.01\n[parts]\n")
-    with pytest.raises(
-        InputError, match=r"nothing.toml: the scene has no parts; add \[parts.NAME\], include or \[clamp\]"
-    ):
-        load(file)

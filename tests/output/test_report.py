@@ -8,7 +8,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -17,13 +16,12 @@ from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.engine.distance import measure
 from clamp3d.engine.scene import Scene
-from clamp3d.errors import InputError
 from clamp3d.geometry import shapes
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import translation
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.output.report import make_report, report
-from clamp3d.output.report_page import report_csv, report_html, write_report
+from clamp3d.output.report_page import report_html, write_report
 
 ROOT = Path(__file__).resolve().parents[2]
 LOOSE = {"line": "LGJ-10/2", "jumper": "LJ-150"}
@@ -121,14 +119,10 @@ def pictures(page):
 
 def test_page_holds_everything_itself(reference_report, odd_page):
     assert all(s.startswith(("data:", "#")) for s in sources(odd_page))
-    assert "url(" not in odd_page
-    assert "@import" not in odd_page
+    assert not re.search(r"url\(|@import", odd_page)
     # states, steps, and every pair that touches or is declared to but the thread
     assert len(pictures(odd_page)) == 2 + 9
-    for picture in pictures(odd_page):
-        root = ElementTree.fromstring(base64.b64decode(picture))
-        assert root.tag.endswith("svg")
-        assert len(list(root.iter())) > 100
+    assert all(base64.b64decode(picture).count(b"</g>") > 20 for picture in pictures(odd_page))
     for row in reference_report.rows:
         assert odd_page.count(f'id="{row.name}"') == 1
     assert len(re.findall(r'<td style="--c:#[0-9A-F]{6}" class="v-[a-z]+"><a href=', odd_page)) == 21
@@ -156,18 +150,18 @@ def test_a_clashing_scene_says_so_worst_first(clashing, tmp_path):
     assert rows["block-near"].distance.value == pytest.approx(0.3, abs=1e-6)
     (pushed,) = (row for row in found.motions if row.name == "far-near")
     assert pushed.contact_at == pytest.approx((60 - 2.5 - 30.3) / 30, abs=1e-3)
-    lines = list(csv.DictReader(io.StringIO(report_csv(found))))
+    page, data, table = (path.read_text() for path in write_report(found, tmp_path))
+    lines = list(csv.DictReader(io.StringIO(table)))
     assert [(line["a"], line["b"]) for line in lines] == [(r.a, r.b) for r in (*found.rows, *found.motions)]
     assert not [cell for line in lines for cell in line.values() if cell[:1] in ("[", "{")]  # a number a column
     (hit,) = (line for line in lines if line["b"] == "wire" and line["verdict"] == "clash")
     assert 0.0 < float(hit["volume_at_least_mm3"]) <= float(hit["volume_at_most_mm3"])
     assert float(hit["box_y_min"]) <= float(hit["inside_y"]) <= float(hit["box_y_max"])
-    page = report_html(found)
     assert "<i>clash" not in page
     assert len(pictures(page)) == 1 + len(found.findings)
     ids = set(re.findall(r'id="([^"]*)"', page))
     assert {s[1:] for s in sources(page) if s.startswith("#")} <= {i.replace("&#39;", "'") for i in ids}
-    data = json.loads(report(clashing, tmp_path)[1].read_text())
+    data = json.loads(data)
     assert (data["passed"], data["headline"]) == (False, found.headline)
     assert [f["text"] for f in data["findings"]] == [f.text for f in found.findings]
     assert [(p["a"], p["b"]) for p in data["pairs"]] == [(r.a, r.b) for r in found.rows]
@@ -196,14 +190,6 @@ def no_pictures(monkeypatch):
     """Pages without their pictures, which take long."""
     nothing = {kind: [] for kind in ("overview", "steps", "pairs")}
     monkeypatch.setattr("clamp3d.output.report_page._pictures", lambda *_: nothing)
-
-
-def test_folder_that_cannot_be_written_leaves_nothing(reference_report, tmp_path, no_pictures):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "pairs.csv").mkdir()
-    with pytest.raises(InputError, match=r"pairs\.csv"):
-        write_report(reference_report, tmp_path / "out")
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["pairs.csv"]
 
 
 def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, no_pictures, main):

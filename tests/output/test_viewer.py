@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import skimage.color
 import trimesh
 import umsgpack
 from scipy.spatial.transform import Rotation
@@ -312,10 +313,7 @@ def lab(colour, matrix):
     """CIE L*a*b* of "#RRGGBB" as somebody sees it."""
     c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
     linear = np.clip(matrix @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
-    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
-    xyz = np.array(to_xyz) @ linear / [0.95047, 1.0, 1.08883]
-    f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+    return skimage.color.xyz2lab(skimage.color.colorconv.xyz_from_rgb @ linear)
 
 
 @pytest.mark.parametrize("eyes", DICHROMATS)
