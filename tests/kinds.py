@@ -58,9 +58,7 @@ def faceted_shape(solid, error, fit="off"):
 
 
 def pose(axis, angle, place):
-    T = rotation(axis, angle)
-    T[:3, 3] = place
-    return T
+    return translation(*place) @ rotation(axis, angle)
 
 
 def poses(reach):

@@ -1,4 +1,4 @@
-"""The models wedges, hulls and mesh against the exact groove and the independent chords of the section."""
+"""The contact models against the exact groove and each other; what goes with which method."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clamp3d import Cylinder, InputError, assemble, load_clamp
+from clamp3d import Cylinder, InputError, assemble, baselines, load_clamp
 from clamp3d.baselines import Cas, Chords, Hulls, Meshes, Wedges
 from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.bench.compare.scene import block_pair, grooved_block
@@ -140,3 +140,47 @@ def test_wedges_in_3d_assemble_the_clamp_to_the_published_distance():
     result = assemble(clamp, Wedges(parts(clamp), math.radians(40.0)))
     assert result.clamped
     assert result.distance == pytest.approx(32.647, abs=2e-3)  # by steps: the chords
+
+
+@pytest.mark.parametrize(("unit_deg", "m"), [(180.0 / 8, 8), (5.0, 36), (1.0, 180)])
+def test_a_coaxial_wire_loses_the_chord_error(unit_deg, m):
+    # Chords lie inside the hollow by R (1 - cos(half / m)): known figure 6.865 for R 7, half 90 deg, 8 chords.
+    pair = block_pair(SweptArc(7.0, math.pi / 2, 50.0), Cylinder(1.0, 200.0))
+    free = Chords(math.radians(unit_deg)).distances(pair, np.eye(4)[None])[0] + 1.0
+    assert free == pytest.approx(7.0 * math.cos(math.pi / 2 / m), abs=1e-12)
+    assert m != 8 or free == pytest.approx(6.865, abs=1e-3)
+
+
+def test_chords_of_tilted_wires_are_refused():
+    with pytest.raises(InputError, match="parallel axes only"):
+        Chords(0.1).pieces(PAIR, rotation([1.0, 0.0, 0.0], 1e-6))
+
+
+@pytest.mark.parametrize("angle", [0.0, -1.0, math.pi, math.nan])
+def test_unit_angle_must_be_an_angle(angle):
+    with pytest.raises(InputError, match=r"unit angle must be (between 0 and 180 deg|a finite number)"):
+        Chords(angle)
+
+
+@pytest.mark.parametrize("name", baselines.METHODS)
+def test_every_method_is_made_and_makes_nothing_before_it_is_asked(name):
+    model = baselines.contact_model(name, {"P1": BLOCK}, progress=False)
+    assert model.name == name
+    assert model.meshes_built == 0
+    if name != "hulls":  # CoACD takes seconds
+        assert abs(model.distances(PAIR, np.eye(4)[None])[0] - 1.5) < 0.06  # 12 - 10.5 less the chord error
+        assert model.meshes_built == (1 if name == "mesh" else 0)
+
+
+@pytest.mark.parametrize(
+    ("method", "parts", "settings", "message"),
+    [
+        ("mesh", {"P1": BLOCK}, {"threshold": 1.0}, "threshold goes with method hulls, got method 'mesh'"),
+        ("fog", None, {}, "unknown method 'fog'; available: cas, chords, wedges, hulls, mesh"),
+        ("wedges", None, {}, "method 'wedges' needs the parts"),
+        ("mesh", [BLOCK], {}, "parts must be"),
+    ],
+)
+def test_what_does_not_go_together_is_said_in_one_line(method, parts, settings, message):
+    with pytest.raises(InputError, match=message):
+        baselines.contact_model(method, parts, **settings)

@@ -17,6 +17,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.ways import Insertion
 from clamp3d.errors import SequenceError
+from clamp3d.kernel import translation
 from clamp3d.output.report import make_report
 
 SCREW = ("P4", "P5")  # one diameter, so facets overlap all around
@@ -43,12 +44,6 @@ def reference():
 def at_once():
     """The nut draws all that is below it."""
     return assemble(replace(load_clamp(), sequence="P1|P2P3P4P5 -> P7 -> P5|P2P3P4"))
-
-
-def at(T, offset):
-    moved = T.copy()
-    moved[:3, 3] += offset
-    return moved
 
 
 def overlaps_on(path, steps=3):
@@ -115,7 +110,7 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     T = {part.name: part.T_world for part in scene.parts}
     assert set(motion.parts) | {first.b, "P6"} <= set(T)
     for off, meets in ((0.2, True), (-0.2, False)):
-        moved = at(T[first.a], (first.travel + off) / first.way * motion.travel)
+        moved = translation(*((first.travel + off) / first.way * motion.travel)) @ T[first.a]
         assert (volume(first.a, moved, first.b, T[first.b]) > 1e-6) == meets
 
 

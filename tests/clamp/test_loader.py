@@ -5,7 +5,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from clamp3d import InputError, load_clamp
+from clamp3d import InputError, assemble, load_clamp
 from clamp3d.clamp.conductors import catalogue, conductor
 
 REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").read_text(encoding="utf-8")
@@ -80,3 +80,11 @@ def test_catalogue_is_complete():
     assert len(catalogue()) == 51
     assert conductor("Pigeon").diameter == 12.75
     assert all(0 < c.diameter < 50 and c.standard and c.source for c in catalogue().values())
+
+
+def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path):
+    copy = tmp_path / "copy.toml"
+    copy.write_text(REFERENCE)
+    found = [assemble(clamp, line="LJ-500", jumper=16) for clamp in ("reference", copy, load_clamp())]
+    assert len({(a.status, a.distance) for a in found}) == 1
+    assert repr(found[0]) == f"<Assembly reference: clamped, {found[0].distance:.3f} mm>"

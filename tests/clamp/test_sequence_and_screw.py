@@ -42,20 +42,23 @@ def test_every_step_ends_at_a_contact_that_is_declared():
     assert run.turns == pytest.approx((run.path[0].poses["P2"].y - run.path[0].poses["P1"].y - run.closing) / 2.5)
 
 
-def with_bolt(shank_length):
-    clamp = load_clamp()
-    return replace(clamp, bolt=replace(clamp.bolt, shank_length=shank_length))
-
-
 @pytest.mark.parametrize("lacking", [-0.01, 0.01, 30.0, 67.0])
 def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
-    poses = assemble(load_clamp(), Cas()).poses
-    through = load_clamp().bolt.shank_length + poses["P4"].y - poses["P5"].y  # its end flush with the nut's free face
-    run = assemble(with_bolt(through - lacking), Cas())
-    if lacking < 0.0:
-        assert run.status == "clamped"
-    else:
-        assert run.status == f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
+    clamp, poses = load_clamp(), assemble(load_clamp(), Cas()).poses
+    through = clamp.bolt.shank_length + poses["P4"].y - poses["P5"].y  # its end flush with the nut's free face
+    run = assemble(replace(clamp, bolt=replace(clamp.bolt, shank_length=through - lacking)), Cas())
+    short = f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
+    assert run.status == ("clamped" if lacking < 0.0 else short)
     gaps = {(c.a, c.b): c.gap for c in run.contacts}
     assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-6)
     assert np.isfinite(list(gaps.values())).all()
+
+
+def test_scenes_are_the_parts_at_their_poses():
+    assembly = assemble()
+    for waypoint in (assembly.path[0], assembly.path[-1]):
+        scene = assembly.scene_at(waypoint)
+        assert [part.name for part in scene.parts] == ["P1", "P2", "P3", "P4", "P5", "P6", "P7"]
+        for part in scene.parts:
+            assert np.array_equal(part.T_world, waypoint.T_world(part.name))
+    assert all(np.array_equal(part.T_world, assembly.T_world(part.name)) for part in assembly.scene.parts)
