@@ -59,20 +59,6 @@ def hinge():
     return parts
 
 
-def clip():
-    """A bent pipe in two clips on a base: tori, cylinders, planes."""
-    straight = cut(rod(5.0, 0, 30), rod(4.0, -1, 31))
-    bend = cut(ring(20.0, 5.0), ring(20.0, 4.0))
-    bend = BRepAlgoAPI_Common(bend, box((0, -30, -6), (30, 0, 6))).Shape()
-    turn = np.array([[1.0, 0, 0, -20], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
-    parts = {"pipe": fuse(straight, moved(bend, turn))}
-    for k, z in enumerate((8.0, 20.0)):
-        body = box((-8, -9, z), (8, 2, z + 5))
-        parts[f"clip_{k}"] = cut(body, rod(5.0, z - 1, z + 6), box((-3.5, 0, z - 1), (3.5, 3, z + 6)))
-    parts["base"] = box((-20, -12, 0), (20, -9, 30))
-    return parts
-
-
 def taper():
     """A taper pin in a hub, a ball in its socket, a rubber ring in its groove: cones, spheres, tori."""
     plate = cut(box((-14, -14, -10), (14, 14, 10)), cone(2.0, 2.5, -10.0, 10.0))
@@ -237,4 +223,4 @@ def from_shell(solid):
     return distance
 
 
-ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, clip, taper, gears)}
+ASSEMBLIES = {made.__name__: made for made in (fasteners, hinge, taper, gears)}

@@ -8,8 +8,8 @@ from clamp3d import check, load
 from tests.files.assemblies import ASSEMBLIES, judged, near, nudged, truth, write_step
 
 
-# scripts/check-assemblies does the same for the clip too and for larger ones, as drawn and moved in several ways.
-@pytest.mark.parametrize("name", [name for name in ASSEMBLIES if name != "clip"])
+# scripts/check-assemblies does the same for them and for larger ones, as drawn and moved in several ways.
+@pytest.mark.parametrize("name", ASSEMBLIES)
 def test_verdicts_and_bounds_of_an_assembly_whose_parts_are_moved(name, tmp_path):
     parts = nudged(ASSEMBLIES[name](), 1)
     scene = load(write_step(parts, tmp_path / f"{name}.step"))
