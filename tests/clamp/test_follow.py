@@ -131,10 +131,3 @@ def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
     assert made.steps[-1].turns == pytest.approx(run.turns)
     assert made.tightening[-1]["nut_turns"] == pytest.approx(run.turns)
     assert all(row["saddle_gap_mm"] == 0.0 for row in made.tightening)
-
-
-def test_a_bolted_clamp_cannot_straddle_two_wires_that_have_no_ends():
-    with pytest.raises(SequenceError, match=r"step 2, P1\|P2P3P4P5: no way .* P1 \(up splint\) meets P6") as refused:
-        assemble("reference", sequence="P7 -> P1|P2P3P4P5 -> P2 -> P5|P3P4")
-    assert {(block.a[0], block.b) for block in refused.value.blocks} <= {("P", "P6"), ("P", "P7")}
-    assert all(0.0 < block.travel < block.way for block in refused.value.blocks)
