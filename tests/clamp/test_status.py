@@ -36,7 +36,7 @@ def nearest_feature(run, splint, wire):
     count = math.ceil(abs(groove.sweep) / math.sqrt(8e-6 / groove.radius))
     arc = shapely.LineString([groove.at(t) for t in np.linspace(groove.start_angle, groove.end_angle, count)])
     level = groove.start[1]
-    half = 0.5 * max(run.clamp.up_splint.width if splint == "P1" else run.clamp.down_splint.width, 0.0)
+    half = 0.5 * (run.clamp.up_splint if splint == "P1" else run.clamp.down_splint).width
     middle = half if splint == "P1" else 0.0
     outer = middle + (-half if wire == "P6" else half)
     lips = sorted((groove.start[0], groove.end[0]))
