@@ -1,7 +1,5 @@
 """``clamp3d check`` and ``clamp3d sweep`` as a user calls them."""
 
-from __future__ import annotations
-
 import contextlib
 import html
 import io

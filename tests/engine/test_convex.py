@@ -1,7 +1,5 @@
 """Convex pieces: their geometry against points, their signed distance against hulls and prisms of many sides."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

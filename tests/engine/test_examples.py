@@ -1,7 +1,5 @@
 """The worked examples: parts made by Open CASCADE, verdicts written down beforehand."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

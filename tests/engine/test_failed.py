@@ -1,7 +1,5 @@
 """A pair that cannot be answered is a row of its own, with its reason; exit codes follow the worst certain verdict."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

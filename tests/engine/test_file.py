@@ -1,7 +1,5 @@
 """Scene files: what is read, and one clear line for every fault."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

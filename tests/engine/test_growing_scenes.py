@@ -1,7 +1,5 @@
 """Scenes that grow from each other: none sees another's parts, and what is copied or pickled is the same scene."""
 
-from __future__ import annotations
-
 import pickle
 from copy import copy, deepcopy
 from dataclasses import replace

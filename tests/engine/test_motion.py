@@ -1,7 +1,5 @@
 """Motions in a scene against closed forms and dense sampling."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """One pair of parts at a time, against closed forms and the definitions of the shapes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes: the clamp, broad phase, ladder against full model, allowed contacts, tables, pose sweeps."""
 
-from __future__ import annotations
-
 import importlib.machinery
 import importlib.util
 import itertools

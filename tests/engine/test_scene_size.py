@@ -1,7 +1,5 @@
 """What a scene, its check and its page take grows with the number of parts, not with its square: counts of work."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 

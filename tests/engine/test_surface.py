@@ -1,7 +1,5 @@
 """Nearest points of a mesh to rounding; inner and outer meshes hold the part; touching meshes are decided."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where parts overlap: the volume between its bounds against closed forms, the box, a point in both."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

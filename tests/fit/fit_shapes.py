@@ -1,7 +1,5 @@
 """Test parts with a known truth, made from formulas and trimesh, not by the package."""
 
-from __future__ import annotations
-
 import manifold3d
 import numpy as np
 import trimesh

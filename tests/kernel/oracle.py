@@ -6,8 +6,6 @@ branch and bound with the Lipschitz constant 1 (float64), and the brackets that 
 with 50 digits. Run: ``python -m tests.kernel.oracle``.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Table 3, cell by cell, against constructions in 50 digits and against brute force over a dense arc."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

@@ -72,7 +72,7 @@ def test_an_axis_that_is_exactly_along_an_edge(axis):
     """Beyond an end and beside it: lines that are parallel have no nearest point of their own."""
     rng = np.random.default_rng(3)
     groove, wire = SweptArc(8.0, 0.4, 16.0), Capsule(2.5, 3.0)
-    for centre in rng.uniform(-16.0, 16.0, (24, 3)):
+    for centre in rng.uniform(-16.0, 16.0, (8, 3)):
         answer = signed_distances(groove, wire, np.array([[centre, axis]]), full=True)
         mp.mp.dps = 50
         value = exact_distance(8.0, 0.4, 16.0, 2.5, 3.0, [mp.mpf(x) for x in centre], [mp.mpf(x) for x in axis])
@@ -99,7 +99,7 @@ def test_witnesses_lie_on_both_surfaces_and_moving_by_the_distance_makes_them_to
 def test_world_offsets_cost_nothing():
     mp.mp.dps = 50
     rng = np.random.default_rng(5)
-    for case in CASES[::40]:
+    for case in CASES[::60]:
         A = rotation(rng.normal(size=3), 1.0)
         A[:3, 3] = rng.uniform(-1e6, 1e6, 3)
         B = A @ case.pose
@@ -112,32 +112,6 @@ def test_world_offsets_cost_nothing():
         exact = exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, list(c), list(d / n))
         answer = signed_distance(g, w, relative_pose(A, B))
         assert abs(mp.mpf(answer.distance) - mp.mpf(exact)) <= 1e-12 * case.size
-
-
-def test_no_wrong_sign_at_a_nanometre():
-    # Gaps made from closed forms: an arc, a lip, a flat face, and the ends of a tilted wire (below).
-    groove = SweptArc(12.0, math.radians(70.0), 50.0)
-    h, s = -12.0 * math.cos(groove.half_angle), 12.0 * math.sin(groove.half_angle)
-    for gap in (1e-9, -1e-9, 3e-10, -3e-10):
-        for T in (
-            translation(0.0, -1.5 + gap, 3.0),
-            translation((1.5 - gap) * math.sin(1.0), -(1.5 - gap) * math.cos(1.0), 3.0),
-            translation(-s - 4.0, h + 10.5 + gap, -80.0 + 20.0),
-            translation(s - (10.5 + gap) * math.sin(0.3), h + (10.5 + gap) * math.cos(0.3), 0.0),
-        ):
-            assert signed_distance(groove, Capsule(10.5, 80.0), T).distance == pytest.approx(gap, abs=2e-14)
-
-
-def test_tilted_wire_touches_at_both_ends():
-    # R - (L / 2 tan t + r / cos t) = 0
-    groove, wire = SweptArc(7.0, math.pi / 2, 50.0), Capsule(6.935, 100.0)
-    zero = math.radians(0.148915009)
-    for axis in ((0, 1, 0), (1, 0, 0)):
-        inside, outside = (signed_distance(groove, wire, rotation(axis, zero * f)).distance for f in (0.9999, 1.0001))
-        assert inside > 0.0 > outside
-    t = 0.002
-    wanted = (7.0 - 25.0 * math.tan(t)) * math.cos(t) - 6.935
-    assert signed_distance(groove, wire, rotation((1, 0, 0), t)).distance == pytest.approx(wanted, abs=1e-14)
 
 
 def test_tiny_and_huge_numbers():

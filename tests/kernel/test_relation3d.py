@@ -11,47 +11,42 @@ from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.kernel.arc_and_circle import ArcRelation, arc_circle
 from clamp3d.kernel.relation import Relation3D, groove_relation
 
-GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
+GROOVE, MAJOR = SweptArc(7.0, math.radians(60.0), 50.0), SweptArc(7.0, math.radians(120.0), 50.0)
 S, H = 7.0 * math.sin(GROOVE.half_angle), -7.0 * math.cos(GROOVE.half_angle)
 TILT = rotation((1, 0, 0), 0.01)
 
 
+def at_lip(angle):
+    """Where a wire of radius 3 touches the lip N of the major arc, ``angle`` off the face's normal."""
+    return translation(S - 3.0 * math.sin(angle), 3.5 + 3.0 * math.cos(angle), 0.0)
+
+
 @pytest.mark.parametrize(
-    ("radius", "T", "wanted"),
+    ("groove", "radius", "T", "wanted"),
     [
-        (3.0, translation(0.0, -2.0, 0.0), "inside"),
-        (3.0, translation(0.0, -2.0, 0.0) @ TILT, "inside"),
-        (3.0, translation(0.0, 0.0, 0.0), "outside"),
-        (3.0, translation(0.0, -2.0, 70.0), "outside"),
-        (3.0, translation(0.0, -4.0, 0.0), "interior contact"),
-        (3.0, translation(0.0, -4.1, 0.0), "intersect"),
-        (3.0, translation(0.0, -5.0, 0.0) @ TILT, "intersect"),
-        (3.0, translation(S + 5.0, H + 3.0, 0.0), "exterior contact"),
-        (3.0, translation(S - 3.0 * math.sin(1.0), H + 3.0 * math.cos(1.0), 0.0), "interior contact"),
-        (3.0, translation(0.0, -12.0, 68.0), "exterior contact"),
-        (9.0, translation(0.0, H + math.sqrt(81.0 - S * S), 0.0), "interior contact"),
-        (3.0, translation(0.0, H + 2.9, 0.0), "inside"),
-        (3.0, translation(0.0, H + 3.1, 0.0), "outside"),
-        (0.5, translation(0.0, -3.0, 0.0) @ rotation((0, 1, 0), math.pi / 2), "outside"),
+        (GROOVE, 3.0, translation(0.0, -2.0, 0.0), "inside"),
+        (GROOVE, 3.0, translation(0.0, -2.0, 0.0) @ TILT, "inside"),
+        (GROOVE, 3.0, translation(0.0, 0.0, 0.0), "outside"),
+        (GROOVE, 3.0, translation(0.0, -2.0, 70.0), "outside"),
+        (GROOVE, 3.0, translation(0.0, -4.0, 0.0), "interior contact"),
+        (GROOVE, 3.0, translation(0.0, -4.1, 0.0), "intersect"),
+        (GROOVE, 3.0, translation(0.0, -5.0, 0.0) @ TILT, "intersect"),
+        (GROOVE, 3.0, translation(S + 5.0, H + 3.0, 0.0), "exterior contact"),
+        (GROOVE, 3.0, translation(S - 3.0 * math.sin(1.0), H + 3.0 * math.cos(1.0), 0.0), "interior contact"),
+        (GROOVE, 3.0, translation(0.0, -12.0, 68.0), "exterior contact"),
+        (GROOVE, 9.0, translation(0.0, H + math.sqrt(81.0 - S * S), 0.0), "interior contact"),
+        (GROOVE, 3.0, translation(0.0, H + 2.9, 0.0), "inside"),
+        (GROOVE, 3.0, translation(0.0, H + 3.1, 0.0), "outside"),
+        (GROOVE, 0.5, translation(0.0, -3.0, 0.0) @ rotation((0, 1, 0), math.pi / 2), "outside"),
+        # Fig. 6: exterior if the centre is beyond the perpendicular to OM at M, here 30 deg off the face's normal.
+        (MAJOR, 3.0, at_lip(0.2), "exterior contact"),
+        (MAJOR, 3.0, at_lip(math.radians(29.9)), "exterior contact"),
+        (MAJOR, 3.0, at_lip(0.6), "interior contact"),
     ],
 )
-def test_table_3_in_any_pose(radius, T, wanted):
+def test_table_3_in_any_pose(groove, radius, T, wanted):
     length = 4.0 if wanted == "outside" and radius == 0.5 else 80.0
-    assert groove_relation(GROOVE, Capsule(radius, length), T, tolerance=1e-9).relation.value == wanted
-
-
-def test_lip_of_a_major_arc_is_touched_from_both_sides():
-    groove = SweptArc(7.0, math.radians(120.0), 50.0)
-    lip = np.array([7.0 * math.sin(groove.half_angle), -7.0 * math.cos(groove.half_angle)])
-    # Fig. 6: exterior if the centre is on the far side of the perpendicular to OM at M. That is 30 deg off the face's
-    # normal here.
-    for angle, wanted in (
-        (0.2, "exterior contact"),
-        (math.radians(29.9), "exterior contact"),
-        (0.6, "interior contact"),
-    ):
-        T = translation(lip[0] - 3.0 * math.sin(angle), lip[1] + 3.0 * math.cos(angle), 0.0)
-        assert groove_relation(groove, Capsule(3.0, 80.0), T, tolerance=1e-9).relation.value == wanted
+    assert groove_relation(groove, Capsule(radius, length), T, tolerance=1e-9).relation.value == wanted
 
 
 @settings(max_examples=150, deadline=None)
