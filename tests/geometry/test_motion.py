@@ -13,14 +13,15 @@ from clamp3d.kernel.distance import Feature, signed_distances
 
 GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(10.5, 80.0)
 S, H = 12.0 * math.sin(GROOVE.half_angle), -12.0 * math.cos(GROOVE.half_angle)
+DROP = Motion.translate((0.0, -40.0, 0.0))
 
 
 def test_drop_into_the_groove():
-    hit = first_contact(GROOVE, WIRE, Motion.translate((0.0, -40.0, 0.0)), translation(0.0, 20.0, 0.0))
+    hit = first_contact(GROOVE, WIRE, DROP, translation(0.0, 20.0, 0.0))
     assert hit.touches
     assert hit.t == pytest.approx(21.5 / 40.0, abs=1e-15)
     assert hit.contact.feature is Feature.ARC
-    early = first_contact(GROOVE, WIRE, Motion.translate((0.0, -40.0, 0.0)), translation(0.0, 20.0, 0.0), margin=0.25)
+    early = first_contact(GROOVE, WIRE, DROP, translation(0.0, 20.0, 0.0), margin=0.25)
     assert early.t == pytest.approx(21.25 / 40.0, abs=1e-12)
     assert early.distance.value == pytest.approx(0.25, abs=1e-12)
     rest = first_contact(GROOVE, WIRE, Motion.translate((0.0, 0.0, 0.0)))
@@ -40,7 +41,6 @@ def test_swing_about_an_end_reaches_the_end_edge():
 def test_sliding_near_a_surface_is_proven_quickly():
     slides = [
         (1e-4, translation(0.0, -1.5 + 1e-4, -100.0), (0.0, 0.0, 200.0)),  # through the groove
-        (0.1, translation(-200.0, H + 10.5 + 0.1, 0.0), (170.0, 0.0, 0.0)),  # along a flat face
         (0.1, translation(0.0, -30.0, 65.0 + 10.5 + 0.1), (5.0, -60.0, 0.0)),  # in front of an end face
     ]
     for gap, start, way in slides:
@@ -65,7 +65,8 @@ def test_grazing_a_lip(offset):
     tolerance = 1e-10 if offset < 0.0 else 3e-3  # a double root is known to the square root of the accuracy
     assert hit.t * 7.0 == pytest.approx(wanted, abs=tolerance)
     assert hit.contact.feature is Feature.LIP_N
-    assert min_clearance(groove, wire, path, T).distance.value == pytest.approx(offset, abs=1e-6)
+    least = min_clearance(groove, wire, path, T) if hit.touches else hit
+    assert least.distance.value == pytest.approx(offset, abs=1e-6)
 
 
 def test_thin_wire_through_a_thin_sheet_is_not_missed():
@@ -108,11 +109,8 @@ def test_the_first_of_several_contacts_is_found_not_the_deepest(kind):
         (lambda: Motion.screw((0, 0, 0), 1.0), "axis must not be zero"),
         (lambda: Motion.translate((0, np.nan, 0)), "by must be finite, got nan"),
         (lambda: Motion.screw((0, 0, 1), math.inf, travel=1.0), "angle must be a finite number"),
-        (
-            lambda: first_contact(GROOVE, WIRE, Motion.translate((0, 0, 1)), np.zeros((4, 4))),
-            "T_a_b must have the last",
-        ),
-        (lambda: first_contact(GROOVE, WIRE, Motion.translate((0, 0, 1)), margin=math.nan), "margin must be a finite"),
+        (lambda: first_contact(GROOVE, WIRE, DROP, np.zeros((4, 4))), "T_a_b must have the last"),
+        (lambda: first_contact(GROOVE, WIRE, DROP, margin=math.nan), "margin must be a finite"),
         (lambda: min_clearance(GROOVE, WIRE, 3), "motion must be a Motion"),
     ],
 )
@@ -130,5 +128,6 @@ def test_a_diagonal_way_down_onto_a_flat_face(side, slope):
     least = min_clearance(GROOVE, WIRE, way, start)
     assert least.t == pytest.approx(1.0, abs=1e-12)
     assert least.distance.value == pytest.approx(15.0 - 10.5, abs=1e-12)
+    assert least.evaluations < 100
     low = Motion.translate((side * 25.0 / slope, -25.0, 0.0))
     assert first_contact(GROOVE, WIRE, low, start).t == pytest.approx((30.0 - 10.5) / 25.0, abs=1e-12)
