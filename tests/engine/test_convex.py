@@ -45,7 +45,7 @@ def some_piece(rng):
 
 
 def some_pair(seed):
-    """Two pieces, one of them placed so that they are apart or overlap by a step from 1e-6 to 3 mm."""
+    """Two pieces, one of them placed so that they are apart or overlap by a step from 1e-6 to 6 mm."""
     rng = np.random.default_rng(seed)
     a, b = some_piece(rng), some_piece(rng)
     if isinstance(a, Rod) and isinstance(b, Rod):
@@ -54,7 +54,7 @@ def some_pair(seed):
     n = rng.normal(size=3)
     n /= np.linalg.norm(n)
     reach = (corners(a, HERE) @ n).max() - (corners(b, T) @ n).min()
-    return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.5)) * n)) @ T
+    return a, b, translation(*((reach + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.8)) * n)) @ T
 
 
 @pytest.mark.parametrize("gap", [-1e-9, -1e-12, 0.0, 1e-12, 1e-9])
@@ -65,7 +65,7 @@ def test_a_point_beside_a_piece_attests_no_overlap(gap):
     assert found.lower - 1e-13 <= gap <= found.upper + 1e-13
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(60))
 def test_the_signed_distance_of_two_pieces(seed):
     """Between bounds that hold, sharp where they are apart, with points of both pieces and the normal between them."""
     a, b, T = some_pair(seed)
@@ -79,6 +79,12 @@ def test_the_signed_distance_of_two_pieces(seed):
             assert found.upper - found.lower <= 1e-8 * (1.0 + found.upper)
         elif most < -1e-8:
             assert found.upper <= 1e-9
+    if most < -1e-8:
+        depth = convex_depth(a, HERE, b, T)
+        assert depth.lower - 1e-11 <= most
+        assert least <= depth.upper + 1e-11
+        assert depth.upper - depth.lower <= 1e-8
+        assert most > least or depth.value == pytest.approx(most, abs=1e-11)
     found = convex_distance(a, HERE, b, T)
     if found.point_a is None or found.upper == math.inf:
         return

@@ -1,7 +1,12 @@
+"""Distances and depths of pairs in closed form, and what an answer tells of itself."""
+
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
+import trimesh
 
 from clamp3d.baselines.chords import Chords
 from clamp3d.clamp.assemble import assemble
@@ -12,7 +17,6 @@ from clamp3d.engine.distance import distance, measure
 from clamp3d.engine.result import CheckResult, PairResult
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.engine.verdict import Verdict
-from clamp3d.errors import InputError
 from clamp3d.geometry import shapes
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.mesh import make_mesh
@@ -21,6 +25,7 @@ from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from clamp3d.geometry.profile import Profile
 from clamp3d.kernel.distance import signed_distance
+from tests.kinds import faceted_shape
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -62,6 +67,12 @@ def test_nearest_points_that_are_not_the_only_ones_are_told(a, b, T, unique):
     assert distance(a, b, closer).value == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1e-8, 3e-8, 1e-7])
+def test_unique_is_not_claimed_where_rounding_decides(tilt):
+    cube = shapes.box((4, 4, 4))
+    assert distance(shapes.box((10, 10, 10)), cube, translation(0, 0, 9) @ rotation([1, 2, 0], tilt)).unique is not True
+
+
 def test_a_bolt_whose_axis_lies_in_the_plane_between_the_halves_of_a_hole():
     clamp = assemble()
     splint, bolt = parts(clamp.clamp)["P1"], parts(clamp.clamp)["P4"]
@@ -83,21 +94,6 @@ def test_contact_models_answer_where_a_groove_is_nearest():
         else:
             assert d.value == exact[pair].value
     assert "chords" in asked["P1", "P6"].to_dict()["method"]
-
-
-def test_parts_check_themselves_and_scenes_take_them():
-    part = Part("block", BLOCK)
-    assert Scene().add(part).parts[0].T_world.tolist() == np.eye(4).tolist()
-    assert Scene((part,)).add("wire", Cylinder(1.0, 2.0)).parts[1].shape.name == "cylinder"
-    for bad, message in (
-        (lambda: Part("a b", BLOCK), "part name must not be empty or hold a space"),
-        (lambda: Part("a", 3), "a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got int"),
-        (lambda: Part("a", BLOCK, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
-        (lambda: Scene((part,)).add(part), "part 'block' is there twice"),
-        (lambda: Scene().add(part, BLOCK), "takes a Part alone"),
-    ):
-        with pytest.raises(InputError, match=message):
-            bad()
 
 
 def test_a_clash_in_a_motion_is_in_counts_findings_and_data_alike():
@@ -131,6 +127,44 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
     d = distance(plate, shapes.MeshShape(OCTAHEDRON, fit="off"), translation(13.0 + gap, 0.0, 0.0))
     assert d.lower <= truth + 1e-9
     assert d.upper >= truth - 1e-9
+
+
+@pytest.mark.parametrize("x", [-15.0, -20.0, -25.0])
+def test_bolt_through_the_wall_of_its_hole(x):
+    """The shortest way is back into the hole: 14, 19, 24 mm."""
+    plate = shapes.box((137.0, 60.0, 28.0), holes=[shapes.Hole(11.0)])
+    d = distance(plate, shapes.cylinder(10.0, 160.0), translation(x, 0.0, 0.0))
+    assert d.lower <= x + 1.0 <= d.upper
+
+
+def test_wire_too_thick_for_its_groove_rests_on_both_lips():
+    truth = -3.5 + math.sqrt(7.5**2 - (7.0 * math.sin(GROOVE.half_angle)) ** 2)
+    d = distance(BLOCK, shapes.cylinder(7.5, 80.0))
+    assert -1.0 <= d.lower <= -truth <= d.upper
+
+
+@pytest.mark.parametrize("drop", [0.01, 0.5, 3.0])
+def test_bar_in_a_v_of_a_mesh(drop):
+    outline = [(-30, -25), (30, -25), (30, 20), (20, 20), (0, 0), (-20, 20), (-30, 20)]
+    made = trimesh.creation.extrude_polygon(shapely.Polygon(outline), 80.0)
+    block = shapes.MeshShape(make_mesh(made.vertices - (0.0, 0.0, 40.0), made.faces), "off")
+    T = translation(0.0, 5.0 * math.sqrt(2.0) - drop, 0.0) @ rotation([0, 0, 1], math.pi / 4)
+    d = distance(block, shapes.box((10.0, 10.0, 20.0)), T)
+    assert d.lower - 1e-9 <= -drop <= d.upper + 1e-9
+    assert d.lower >= -1.2 * drop - 0.2
+    assert d.direction == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, -0.7])
+def test_what_touches_within_its_errors_comes_free_along_a_unit_normal(turn):
+    """A wire on the floor of a groove that is known as a mesh only: its facets are 0.05 mm off."""
+    groove, wire = shapes.groove_block(SweptArc(7.0, 1.0, 30.0), 24.0, 12.0), shapes.cylinder(3.0, 18.0)
+    block = replace(faceted_shape(groove, 0.05), error=0.05)
+    T = translation(4.0 * math.sin(turn), -4.0 * math.cos(turn), 0.0)
+    d = distance(block, wire, T)
+    assert d.lower < 0.0 < d.upper
+    assert np.linalg.norm(d.normal) == pytest.approx(1.0, abs=1e-12)
+    assert distance(groove, wire, translation(*((1e-6 - d.lower) * d.normal)) @ T).lower > 0.0
 
 
 @pytest.mark.parametrize("depth", [5e-7, 1e-8])

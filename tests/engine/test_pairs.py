@@ -1,58 +1,53 @@
-"""One pair of parts at a time, against closed forms and the definitions of the shapes."""
+"""One pair of parts at a time, against closed forms: verdicts, distances, depths, and where parts overlap."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.check import check
+from clamp3d.engine.distance import distance
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.geometry import shapes
+from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import rotation, translation
 from clamp3d.geometry.primitives import SweptArc
-from clamp3d.testing import common, separation
 from tests.kinds import measured_alike
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
-WIRE = shapes.cylinder(6.935, 80.0)
+WIRE, CUBE = shapes.cylinder(6.935, 80.0), shapes.box((10, 10, 10))
+QUARTER = rotation([0, 1, 0], math.pi / 2)
 
 
-def pair(a, b, T, **settings_):
-    scene = Scene(**settings_).add("a", a).add("b", b, T)
-    return scene, check(scene)
+def row_of(a, b, T, **settings_):
+    (row,) = check(Scene(**settings_).add("a", a).add("b", b, T)).pairs
+    return row
 
 
 @pytest.mark.parametrize(
-    ("T", "distance"),
+    ("T", "gap"),
     [
         (np.eye(4), 0.065),  # coaxial
         (translation(0, -0.065, 0), 0.0),
         (translation(0, -0.0751, 0), -0.0101),
         (translation(20 + 6.935 + 0.3, -12.0, 0), 0.3),  # beside the block, where the endless groove has material
         (translation(0, -23.5 - 6.935 - 0.2, 0), 0.2),  # below it
-        (translation(20 + 0.3 + 6.935 / math.sqrt(2), -3.5 + 0.3 + 6.935 / math.sqrt(2), 0), None),  # off its edge
-        (translation(0, -3.5 + 6.935 + 0.4, 0) @ rotation([0, 1, 0], math.pi / 2), 0.4),  # across, on both flats
-        (translation(5, -3.5 + 6.935 + 0.4, 3) @ rotation([0, 1, 0], math.pi / 2), 0.4),  # its middle off the block
+        (translation(20.3 + 6.935 / math.sqrt(2), -3.2 + 6.935 / math.sqrt(2), 0), 0.3 * math.sqrt(2)),  # off its edge
+        (translation(0, -3.5 + 6.935 + 0.4, 0) @ QUARTER, 0.4),  # across, on both flats
+        (translation(5, -3.5 + 6.935 + 0.4, 3) @ QUARTER, 0.4),  # its middle off the block
         (translation(0, -7 - 6.935 - 0.1, 65.5), 0.5),  # in line with the block's end, below the groove
         (translation(0, 0, 25.0 + 39.0), 0.065),  # one millimetre of it still in the groove
     ],
 )
-def test_wire_at_block_is_exact_all_around(T, distance):
-    scene = Scene(clearance=2.0).add("a", BLOCK).add("b", WIRE, T)
-    row = check(scene).pairs[0]
-    truth = separation(BLOCK, WIRE, T)
-    if distance is None:
-        distance = truth.upper
-        assert row.distance.lower - 1e-6 <= distance <= row.distance.upper + 1e-6
-    elif distance > 0.0:
-        assert truth.lower <= distance <= truth.upper + 1e-6  # the oracle agrees with the closed form of the test
-        assert row.distance.lower - 1e-6 <= distance <= row.distance.upper + 1e-6
-    if distance < -1e-9:
-        assert common(BLOCK, WIRE, T, accuracy=1e-3).lower < 0.0
-        assert row.distance.lower - 1e-6 <= distance <= row.distance.upper + 1e-6
-    assert row.verdict is scene.thresholds.verdict(Distance(distance, distance))
+def test_wire_at_block_is_exact_all_around(T, gap):
+    row = row_of(BLOCK, WIRE, T, clearance=2.0)
+    assert row.distance.lower - 1e-6 <= gap <= row.distance.upper + 1e-6
+    assert row.verdict is Thresholds(clearance=2.0).verdict(Distance(gap, gap))
 
 
 @pytest.mark.parametrize(
@@ -61,7 +56,7 @@ def test_wire_at_block_is_exact_all_around(T, distance):
         (shapes.cylinder(4.0, 30.0), translation(0, -16, 0), "contained"),  # wholly in the block's wall: no surface met
         (shapes.cylinder(4.0, 60.0), translation(0, -16, 0), "clash"),  # sticks out at both ends
         (shapes.box((200, 200, 200)), np.eye(4), "contained"),
-        (shapes.box((10, 10, 10)), translation(0, -3.5 + 5.0, 0), "clear"),  # hovers in the mouth: 7 deep, 12 wide
+        (CUBE, translation(0, -3.5 + 5.0, 0), "clear"),  # hovers in the mouth: 7 deep, 12 wide
         (shapes.box((40, 4, 50)), translation(0, -1.5, 0), "contact"),  # lies on both flats, over the mouth
         (shapes.box((40, 4, 50)), translation(0, -1.5 - 0.02, 0), "clash"),
         (shapes.box((40, 4, 50)), translation(0, -1.5 - 0.008, 0), "contact"),
@@ -69,7 +64,8 @@ def test_wire_at_block_is_exact_all_around(T, distance):
     ],
 )
 def test_verdicts(b, T, verdict):
-    scene, result = pair(BLOCK, b, T, clearance=0.5)
+    scene = Scene(clearance=0.5).add("a", BLOCK).add("b", b, T)
+    result = check(scene)
     assert result.verdict("a", "b").value == verdict
     assert result.verdict("b", "a").value == verdict
     measured_alike(scene, result)
@@ -86,17 +82,72 @@ def test_thresholds():
 
 @pytest.mark.parametrize(("distances", "shift"), [(False, 0.0), (False, 1e-9), (True, 1e-9)])
 @pytest.mark.parametrize(
-    "make",
+    "shape",
     [
-        lambda: shapes.box((50.0, 40.0, 30.0)),
-        lambda: shapes.cylinder(10.0, 40.0),
-        lambda: shapes.cylinder(12.0, 40.0, bore=8.0),
-        lambda: shapes.groove_block(SweptArc(12.0, 1.2, 50.0), 60.0, 30.0),
+        shapes.box((50.0, 40.0, 30.0)),
+        shapes.cylinder(12.0, 40.0, bore=8.0),
+        shapes.groove_block(SweptArc(12.0, 1.2, 50.0), 60.0, 30.0),
     ],
 )
-def test_a_part_that_is_there_twice_clashes(make, shift, distances):
+def test_a_part_that_is_there_twice_clashes(shape, shift, distances):
     # The surfaces coincide, so no point of either lies deep in the other: only what is between them does.
     T = rotation([1, 2, 3], 0.7) @ translation(5.0, 6.0, 7.0)
-    scene = Scene().add("a", make(), T).add("b", make(), T @ translation(shift, 0.0, 0.0))
-    (row,) = check(scene, distances=distances).pairs
-    assert row.verdict is Verdict.DUPLICATE
+    scene = Scene().add("a", shape, T).add("b", replace(shape), T @ translation(shift, 0.0, 0.0))
+    assert check(scene, distances=distances).pairs[0].verdict is Verdict.DUPLICATE
+
+
+def test_a_press_fit_is_judged_by_what_the_parts_share():
+    plate, pin = shapes.box((40, 40, 8), holes=[shapes.Hole(5.0)]), shapes.cylinder(5.02, 20.0)
+    scene = Scene().add("plate", plate).add("pin", pin)
+    assert check(scene).verdict("plate", "pin") is Verdict.CLASH
+    row = check(scene.allow(("plate", "pin"), overlap=0.03)).pairs[0]
+    assert row.verdict is Verdict.ALLOWED
+    assert row.distance.depth == pytest.approx(0.02, abs=1e-9)  # though the way out is lengthwise
+    assert distance(plate, pin).lower <= -13.9
+
+
+def test_without_depths_an_overlap_is_at_least():
+    scene = Scene().add("a", CUBE).add("b", shapes.box((8, 8, 8)), translation(6.0, 0.0, 0.0))
+    found = check(scene, depths=False).pairs[0].distance
+    assert found.lower == -math.inf
+    assert -3.0 <= found.upper < -0.01
+    assert check(scene).pairs[0].distance.depth == pytest.approx(3.0, abs=1e-9)
+
+
+# --- Where they overlap -----------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=15, deadline=None)
+@given(x=st.floats(0.5, 5.0), y=st.floats(-2.0, 2.0))
+def test_boxes_share_a_box(x, y):
+    where = row_of(CUBE, CUBE, translation(10.0 - x, y, 0.0)).where
+    low, high = where.volume
+    assert low <= x * (10.0 - abs(y)) * 10.0 <= high
+    assert high - low < 1e-6
+    assert where.box == pytest.approx(np.array([[5 - x, max(-5, y - 5), -5], [5, min(5, y + 5), 5]]), abs=1e-8)
+    assert not where.of_facets
+
+
+@settings(max_examples=8, deadline=None)
+@given(d=st.floats(0.2, 9.0))
+def test_crossed_side_by_side_cylinders_share_a_lens(d):
+    """Two parallel cylinders of radius 5, axes d apart: the lens of two circles times the length."""
+    where = row_of(shapes.cylinder(5.0, 20.0), shapes.cylinder(5.0, 20.0), translation(d, 0.0, 0.0)).where
+    lens = 2.0 * 25.0 * math.acos(d / 10.0) - 0.5 * d * math.sqrt(100.0 - d * d)
+    low, high = where.volume
+    assert low <= lens * 20.0 <= high
+    half = math.sqrt(25.0 - 0.25 * d * d)
+    assert (where.box[0] <= [d - 5.0, -half, -10.0]).all()
+    assert (where.box[1] >= [5.0, half, 10.0]).all()
+    assert high - low < 0.01 * lens * 20.0
+    assert math.hypot(*where.point[:2]) <= 5.0
+    assert math.hypot(where.point[0] - d, where.point[1]) <= 5.0
+
+
+def test_a_motion_tells_where_it_is_deepest_and_a_clear_pair_nothing():
+    scene = Scene().add("a", CUBE).add("b", CUBE, translation(0, 0, 20)).add("c", CUBE, translation(40, 0, 0))
+    result = check(Scene(parts=scene.parts, motions=(Motion.translate((0, 0, -12), parts=("b",), name="down"),)))
+    (row,) = result.motions
+    assert row.where.to_dict()["volume_at_least_mm3"] > 0.0
+    assert row.where.box[:, 2].tolist() == pytest.approx([row.where.box[0, 2], 5.0])
+    assert all(other.where is None for other in result.pairs)

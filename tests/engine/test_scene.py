@@ -1,9 +1,12 @@
-"""Scenes: the clamp, broad phase, ladder against full model, allowed contacts, tables, pose sweeps."""
+"""Scenes: which pairs are asked for, allowed contacts, parts at many poses, and what is refused."""
 
 import importlib.machinery
 import importlib.util
 import itertools
 import math
+import pickle
+from copy import copy, deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,31 +14,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.parts import parts
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, near_pairs
 from clamp3d.engine.check import check
 from clamp3d.engine.poses import check_poses
-from clamp3d.engine.scene import Scene
+from clamp3d.engine.scene import Part, Scene
 from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
 from clamp3d.errors import InputError
 from clamp3d.geometry import shapes
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, translation
+from clamp3d.geometry.pose import rotation, to_target, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from tests.kinds import measured_alike
 
 ROOT = Path(__file__).resolve().parents[2]
+BOX = shapes.box((1, 1, 1))
 
 
 @pytest.fixture(scope="module")
-def run():
-    return assemble(load_clamp(), Cas())
+def clamp():
+    """The assembled reference clamp, none of whose contacts is allowed."""
+    return replace(assemble().scene, allowed=(), clearance=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -46,53 +48,21 @@ def pack():
     return module.pack
 
 
-def clamp_scene(run, **settings):
-    scene = Scene(**settings)
-    for name, part in parts(run.clamp).items():
-        scene = scene.add(name, part, run.T_world(name))
-    return scene
-
-
-TOUCHING = {
-    ("P1", "P5"),
-    ("P1", "P6"),
-    ("P1", "P7"),
-    ("P2", "P3"),
-    ("P2", "P6"),
-    ("P2", "P7"),
-    ("P3", "P4"),
-    ("P4", "P5"),
-}
-
-
-def test_closed_clamp(run):
-    scene = clamp_scene(run, clearance=0.5)
-    result = check(scene)
-    for a, b in itertools.combinations(run.poses, 2):
-        expected = Verdict.CONTACT if (a, b) in TOUCHING else Verdict.CLEAR
-        assert result.verdict(a, b) is expected, (a, b)
-    grooves = {(r.a, r.b): r for r in result.pairs}
-    for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")):
-        assert grooves[pair].distance.method == "groove kernel"
-        assert abs(grooves[pair].distance.value) < 1e-6
-    measured_alike(scene, result)
-
-
-def test_clamp_from_meshes_read_back(run):
+def test_clamp_from_meshes_read_back(clamp):
     """Meshes with 0.05 mm chord error, fitted: the final state's contacts to within 0.01 mm and their stated bound."""
     scene = Scene(clearance=0.5)
-    for name in ("P1", "P2", "P6", "P7"):
-        made = mesh(parts(run.clamp)[name], 0.05)
-        vertices = np.asarray(made.vertices, dtype=np.float32)  # what an STL keeps
-        shape = shapes.MeshShape(make_mesh(vertices, made.faces, float32=True), "round", name)
-        scene = scene.add(name, shape, run.T_world(name))
+    for part in clamp.parts:
+        if part.name in ("P1", "P2", "P6", "P7"):
+            made = mesh(part.shape, 0.05)
+            read = make_mesh(np.asarray(made.vertices, dtype=np.float32), made.faces, float32=True)  # what an STL keeps
+            scene = scene.add(part.name, shapes.MeshShape(read, "round", part.name), part.T_world)
     result = check(scene)
-    for pair in (("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7")):
-        assert result.verdict(*pair) is Verdict.CONTACT
-        row = next(r for r in result.pairs if (r.a, r.b) == pair)
-        assert row.distance.method == "groove kernel"
-        assert row.distance.lower <= 0.0 <= row.distance.upper
-        assert row.distance.upper - row.distance.lower < 0.01
+    rows = {(row.a, row.b): row for row in result.pairs}
+    for pair in itertools.product(("P1", "P2"), ("P6", "P7")):
+        assert rows[pair].verdict is Verdict.CONTACT
+        assert rows[pair].distance.method == "groove kernel"
+        assert rows[pair].distance.lower <= 0.0 <= rows[pair].distance.upper
+        assert rows[pair].distance.upper - rows[pair].distance.lower < 0.01
     assert result.verdict("P1", "P2") is Verdict.CLEAR
 
 
@@ -119,37 +89,29 @@ def test_broad_phase_against_brute_force():
     bounds = np.sort(rng.uniform(-20, 20, (n, 2, 3)) * rng.choice([0.1, 1.0, 3.0], (n, 1, 1)), axis=1)
     T = np.array([rotation(rng.normal(size=3), rng.uniform(0, 6)) for _ in range(n)])
     T[:, :3, 3] = rng.uniform(-150, 150, (n, 3))
-    boxes = Boxes.of(bounds, T)
-    corners = np.array(list(itertools.product((0, 1), repeat=3)))
-    world = np.array(
-        [np.where(corners == 0, b[0], b[1]) @ P[:3, :3].T + P[:3, 3] for b, P in zip(bounds, T, strict=True)]
-    )
+    world = np.array([to_target(P, list(itertools.product(*b.T))) for b, P in zip(bounds, T, strict=True)])
     low, high = world.min(axis=1), world.max(axis=1)
     near = {
         (i, j)
         for i, j in itertools.combinations(range(n), 2)
         if (np.maximum(low[i], low[j]) - np.minimum(high[i], high[j])).max() <= 2.0
     }
-    assert {tuple(p) for p in near_pairs(boxes, 2.0).tolist()} == near
+    assert {tuple(p) for p in near_pairs(Boxes.of(bounds, T), 2.0).tolist()} == near
 
 
-def test_allowed_contacts(run):
-    scene = clamp_scene(run).allow(("P1", "P6"), ("P*", "P5"))
-    result = check(scene)
-    assert result.verdict("P1", "P6") is Verdict.ALLOWED
-    assert result.verdict("P4", "P5") is Verdict.ALLOWED
-    assert result.verdict("P2", "P6") is Verdict.CONTACT
-
-
-def test_pairs_asked_for_only(run):
-    result = check(clamp_scene(run), pairs=[("P6", "P1"), ("P1", "P2")])
+def test_pairs_asked_for_and_allowed_contacts(clamp):
+    result = check(clamp, pairs=[("P6", "P1"), ("P1", "P2")])
     assert result.work.pairs == 2
     assert [(r.a, r.b) for r in result.pairs] == [("P1", "P6")]
     assert result.verdict("P1", "P2") is Verdict.CLEAR
     with pytest.raises(InputError, match="pair P2:P6 was not checked"):
         result.verdict("P2", "P6")
     with pytest.raises(InputError, match=r"unknown part 'P9'; available: P1, P2"):
-        check(clamp_scene(run), pairs=[("P1", "P9")])
+        check(clamp, pairs=[("P1", "P9")])
+    result = check(clamp.allow(("P1", "P6"), ("P*", "P5")))
+    assert result.verdict("P1", "P6") is Verdict.ALLOWED
+    assert result.verdict("P4", "P5") is Verdict.ALLOWED
+    assert result.verdict("P2", "P6") is Verdict.CONTACT
 
 
 def test_poses_inside_are_contained_as_a_check_says():
@@ -180,21 +142,20 @@ def test_poses_inside_are_contained_as_a_check_says():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Scene().add("a:b", shapes.box((1, 1, 1))), "part name must not"),
-        (lambda: Scene().add("a", shapes.box((1, 1, 1))).add("a", shapes.box((1, 1, 1))), "'a' is there twice"),
+        (lambda: Scene().add("a:b", BOX), "part name must not"),
+        (lambda: Scene().add("a b", BOX), "part name must not be empty or hold a space"),
+        (lambda: Scene().add("a", BOX).add("a", BOX), "'a' is there twice"),
+        (lambda: Scene().add(Part("a", BOX), BOX), "takes a Part alone"),
         (lambda: Scene().add("a", SweptArc(7, 1, 50)), "make a part of it with groove_block"),
-        (lambda: Scene().add("a", shapes.box((1, 1, 1)), np.eye(3)), r"pose of a must have shape \(4, 4\)"),
+        (lambda: Part("a", BOX, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
+        (lambda: Scene().add("a", BOX, np.eye(3)), r"pose of a must have shape \(4, 4\)"),
+        (lambda: Scene().add("a", BOX, translation(0, 0, 2e9)), "offset of pose of a must be three"),
         (lambda: shapes.box((1, 9e-10, 1)), "outline must be wider than 1e-09 mm"),
-        (lambda: shapes.box((1, -1, 1)), "size must be a finite length > 0 mm, got -1"),
         (lambda: shapes.cylinder(5, 10, bore=6), "bore must be between 0 and radius = 5 mm, got 6"),
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 10, 20), "width must be > 11.78"),
         (lambda: shapes.groove_block(SweptArc(7, 1, 50), 40, 2), "height must be > 3.2"),
         (lambda: Scene(clearance=0.001), "clearance must be 0 or > contact = 0.01 mm"),
-        (
-            lambda: Motion.screw((0, 0, 1), parts="pin", angle=1.0, point=(0, 1e18, 0)),
-            "point must be three lengths up to 1e",
-        ),
-        (lambda: Scene().add("a", shapes.box((1, 1, 1)), translation(0, 0, 2e9)), "offset of pose of a must be three"),
+        (lambda: Motion.screw((0, 0, 1), angle=1.0, point=(0, 1e18, 0)), "point must be three lengths up to 1e"),
         (lambda: check_poses(Scene().add("a", Cylinder(1, 2)), "a", [np.eye(4), -np.eye(4)]), r"poses\[1\] must"),
         (lambda: Scene().allow(("a", "b")), "allowed: unknown part 'a'; available: none"),
     ],
@@ -235,3 +196,38 @@ def test_rows_come_as_they_are_decided_and_the_deepest_overlap_first():
         ("shallow", pytest.approx(-1.0, abs=1e-9)),
     ]
     assert {row.b: row.distance.upper for row in result.pairs} == {row.b: row.distance.upper for row in rows[2:]}
+
+
+def names(scene):
+    return [part.name for part in scene.parts]
+
+
+def test_no_scene_sees_what_was_added_to_another():
+    first = Scene().add("a", BOX)
+    left, right = first.add("b", BOX), first.add("c", BOX).allow(("a", "c"), overlap=1.0)
+    more = right.allow(("c", "a"), overlap=3.0).add("b", BOX).moved({"a": translation(1, 2, 3)})
+    assert [names(scene) for scene in (first, left, right, more)] == [["a"], ["a", "b"], ["a", "c"], ["a", "c", "b"]]
+    assert [scene.allowance("a", "c") for scene in (right, more)] == [1.0, 3.0]
+    assert left.allowance("a", "b") is None
+    assert (right.index("c"), more.index("b")) == (1, 2)
+    assert [scene.parts[0].T_world[0, 3] for scene in (first, right, more)] == [0.0, 0.0, 1.0]
+    for scene in (first, left, right, more):
+        same = Scene(scene.parts, allowed=scene.allowed)
+        assert (scene, hash(scene), repr(scene)) == (same, hash(same), repr(same))
+        assert replace(scene, clearance=2.0).parts == scene.parts
+        for wrong in (scene.index, lambda x, scene=scene: scene.moved({x: np.eye(4)})):
+            with pytest.raises(InputError, match="unknown part 'd'"):
+                wrong("d")
+
+
+def test_what_is_copied_or_pickled_cannot_be_written_to_either():
+    T = rotation((1, 2, 3), 0.5)
+    scene = Scene().add("a", BOX, T).add("b", BOX)
+    size = len(pickle.dumps(scene))
+    scene.add("c", BOX)  # whose name is none of the scene's
+    for again in (pickle.loads(pickle.dumps(scene)), copy(scene), deepcopy(scene)):
+        assert again.parts[0].T_world.tobytes() == T.tobytes()
+        assert not again.parts[0].T_world.flags.writeable
+        assert names(again) == ["a", "b"]
+        assert again.index("b") == 1
+    assert len(pickle.dumps(scene)) == size
