@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from clamp3d.engine import moving_pair
 from clamp3d.engine.check import check
 from clamp3d.engine.motions import first_contact
 from clamp3d.engine.scene import Scene
@@ -136,8 +137,9 @@ def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screw
     assert 0.29 < row.contact_at < 0.3
 
 
-def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere():
+def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere(monkeypatch):
     """0.01 mm apart at the start, known to 0.05: no more steps tell whether they touch."""
+    monkeypatch.setattr(moving_pair, "MOST", 300)
     mesh = trimesh.creation.icosphere(1, 10.0)
     ball = MeshShape(make_mesh(mesh.vertices, mesh.faces), "off", error=0.05)
     motion = Motion.screw((0.3, 0.1, 1.0), 1.6, point=(0.0, 60.0, 0.0), parts=("ball",))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clamp3d import Motion, Scene, check, shapes
+from clamp3d.engine import moving_pair
 from clamp3d.engine.open_mesh import _crossing
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry.mesh import make_mesh
@@ -29,12 +30,6 @@ def row(a, b, T, **scene):
     return check(Scene(**scene).add("a", a).add("b", b, T), distances=True).pairs[0]
 
 
-def test_what_an_open_mesh_may_hold_is_not_said_to_be_clear():
-    found = row(CUP, shapes.box((4, 4, 4)), np.eye(4))
-    assert found.verdict.value == "uncertain"
-    assert "a closed mesh of a" in found.reason
-
-
 def test_what_a_closed_part_holds_overlaps_it_however_open():
     found = row(opened(trimesh.creation.box((4, 4, 4)), 3), shapes.box((10, 10, 10)), np.eye(4))
     assert found.verdict.value == "clash"
@@ -48,7 +43,9 @@ def test_a_hole_above_what_is_inside_does_not_let_it_out(turned):
     for k in np.random.default_rng(1).choice(len(ball.faces), 12, replace=False):
         order = np.argsort(-ball.triangles_center @ ball.triangles_center[k])
         holed = trimesh.Trimesh(ball.vertices, ball.faces[order[20:], :: -1 if turned else 1], process=False)
-        assert row(opened(holed), shapes.box((3, 3, 3)), translation(0.4, 0.3, 0.2)).verdict.value == "uncertain"
+        found = row(opened(holed), shapes.box((3, 3, 3)), translation(0.4, 0.3, 0.2))
+        assert found.verdict.value == "uncertain"
+        assert "a closed mesh of a" in found.reason
 
 
 def tube():
@@ -61,7 +58,8 @@ def tube():
     return shapes.MeshShape(make_mesh(V, F), "off", "tube")
 
 
-def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way():
+def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way(monkeypatch):
+    monkeypatch.setattr(moving_pair, "MOST", 300)
     scene = Scene().add("tube", tube()).add("bead", shapes.box((3, 3, 3)), translation(0.3, 0.2, -900.0))
     go = Motion.translate((0.0, 0.0, -1000.0), parts="tube")
     assert check(replace(scene, motions=(go,))).motions[0].verdict.value == "uncertain"
