@@ -5,11 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from clamp3d.clamp.assemble import assemble
-from clamp3d.engine.check import check
-from clamp3d.engine.distance import distance, measure
+from clamp3d import Verdict, assemble, check, distance, measure
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.verdict import Verdict
 from clamp3d.geometry.pose import inverse
 from tests.kinds import measured_alike
 

@@ -8,23 +8,15 @@ import pytest
 import shapely
 import trimesh
 
+from clamp3d import Distance, Verdict, assemble, distance, measure, shapes
 from clamp3d.baselines.chords import Chords
-from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.parts import parts
-from clamp3d.engine.answer import Distance
-from clamp3d.engine.check import check
-from clamp3d.engine.distance import distance, measure
-from clamp3d.engine.result import CheckResult, PairResult
-from clamp3d.engine.scene import Part, Scene
-from clamp3d.engine.verdict import Verdict
-from clamp3d.geometry import shapes
+from clamp3d.engine.result import PairResult
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.mesh import make_mesh
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import inverse, rotation, translation
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.pose import inverse
 from clamp3d.geometry.profile import Profile
-from clamp3d.kernel.distance import signed_distance
+from clamp3d.kernel import Cylinder, SweptArc, rotation, signed_distance, translation
+from clamp3d.shapes import make_mesh
 from tests.kinds import faceted_shape
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
@@ -94,20 +86,6 @@ def test_contact_models_answer_where_a_groove_is_nearest():
         else:
             assert d.value == exact[pair].value
     assert "chords" in asked["P1", "P6"].to_dict()["method"]
-
-
-def test_a_clash_in_a_motion_is_in_counts_findings_and_data_alike():
-    drop = Motion.translate((0.0, -31.0, 0.0), parts="wire", name="drop")
-    scene = Scene((Part("block", BLOCK), Part("wire", Cylinder(6.935, 80.0), translation(0, 30, 0))), motions=(drop,))
-    result = check(scene)
-    assert isinstance(result, CheckResult)
-    assert not result.clean
-    assert result.counts == {"clash": 1, "clear": 1}
-    (row,) = result.findings
-    assert (row.motion, row.verdict) == ("drop", Verdict.CLASH)
-    assert [f["motion"] for f in result.to_dict()["findings"]] == ["drop"]
-    assert repr(result) == "CheckResult('scene': not clean; 1 clash, 1 clear)"
-    assert "<td>drop</td>" in result._repr_html_()
 
 
 OCTAHEDRON = make_mesh(

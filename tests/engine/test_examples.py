@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from clamp3d.engine.check import check
-from clamp3d.scenefile.file import load_scene
+from clamp3d import check, load_scene
 from tests.kinds import measured_alike
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -1,33 +1,21 @@
 """A pair that cannot be answered is a row of its own, with its reason; exit codes follow the worst certain verdict."""
 
 import json
+from dataclasses import replace
 
 import pytest
-from click.testing import CliRunner
 
-from clamp3d.cli import group
+from clamp3d import Distance, Motion, Verdict, check
 from clamp3d.engine import judge, moving_pair
-from clamp3d.engine.answer import Distance
-from clamp3d.engine.check import check
-from clamp3d.engine.scene import Scene
-from clamp3d.engine.verdict import Thresholds, Verdict
+from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import SolverError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import translation
+from clamp3d.scenefile.file import parse_scene
 
 SCENE = """
-[parts.a]
-shape = "box"
-size = [10, 10, 10]
-[parts.b]
-shape = "box"
-size = [10, 10, 10]
-pose = { translation = [9.999, 0, 0] }
-[parts.c]
-shape = "box"
-size = [10, 10, 10]
-pose = { translation = [0, 0, %g] }
+[parts]
+a = { shape = "box", size = [10, 10, 10] }
+b = { shape = "box", size = [10, 10, 10], pose = { translation = [9.999, 0, 0] } }
+c = { shape = "box", size = [10, 10, 10], pose = { translation = [0, 0, %g] } }
 """
 
 
@@ -45,25 +33,21 @@ def broken(monkeypatch):
     monkeypatch.setattr(moving_pair, "refine", ask)
 
 
-def boxes(z: float) -> Scene:
-    box = shapes.box((10, 10, 10))
-    return Scene().add("a", box).add("b", box, translation(9.999, 0, 0)).add("c", box, translation(0, 0, z))
-
-
 def test_a_pair_that_fails_is_a_row_and_the_others_are_answered(broken):
-    result = check(boxes(9.0))
+    result = check(parse_scene(SCENE % 9.0))
     assert result.verdict("a", "b") is Verdict.FAILED
     assert result.verdict("a", "c") is Verdict.CLASH
     (row,) = [row for row in result.pairs if row.verdict is Verdict.FAILED]
     assert row.to_dict()["reason"] == "features and boxes disagree"
-    assert not check(boxes(10.0)).clean
+    assert not check(parse_scene(SCENE % 10.0)).clean
 
 
 def test_a_motion_that_fails_is_a_row(broken):
-    scene = Scene(parts=(*boxes(30.0).parts,), motions=(Motion.translate((0.0, 0.0, 5.0), parts=("c",), name="up"),))
-    moved = Scene(parts=scene.parts, motions=(Motion.translate((0.0, 3.0, 0.0), parts=("b",), name="aside"),))
-    assert [row.verdict for row in check(scene).motions] == []
-    (row,) = check(moved).motions
+    scene = parse_scene(SCENE % 30.0)
+    up = Motion.translate((0.0, 0.0, 5.0), parts=("c",), name="up")
+    aside = Motion.translate((0.0, 3.0, 0.0), parts=("b",), name="aside")
+    assert [row.verdict for row in check(replace(scene, motions=(up,))).motions] == []
+    (row,) = check(replace(scene, motions=(aside,))).motions
     assert (row.verdict, row.motion, row.t) == (Verdict.FAILED, "aside", None)
     assert row.reason
 
@@ -71,14 +55,14 @@ def test_a_motion_that_fails_is_a_row(broken):
 @pytest.mark.parametrize(
     ("z", "broken_pair", "code"), [(10.0, False, 0), (9.0, False, 1), (9.0, True, 1), (10.0, True, 4)]
 )
-def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tmp_path, request):
+def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tmp_path, request, main):
     if broken_pair:
         request.getfixturevalue("broken")
     file, page = tmp_path / "scene.toml", tmp_path / "page.html"
     file.write_text(SCENE % z)
-    done = CliRunner().invoke(group, ["check", str(file), "--json", "-", "--html", str(page), "-q"])
-    assert done.exit_code == code, done.output
-    data = json.loads(done.stdout)
+    ended, out, _ = main("check", file, "--json", "-", "--html", page, "-q")
+    assert ended == code
+    data = json.loads(out)
     assert ("failed" in data["counts"]) == broken_pair
     if broken_pair:
         assert "features and boxes disagree" in page.read_text()

@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clamp3d.engine.check import check
-from clamp3d.engine.verdict import Verdict
-from clamp3d.errors import InputError
-from clamp3d.scenefile.file import load_scene, parse_scene
+from clamp3d import InputError, Verdict, check, load_scene
+from clamp3d.scenefile.file import parse_scene
 from clamp3d.scenefile.pose_table import Pose
 
 WIRE = '[parts.wire]\nshape = "cylinder"\nlength = 80\n'
@@ -38,14 +37,15 @@ def test_poses(text):
     np.testing.assert_allclose(pose_of(text), expected, atol=2e-6)
 
 
-def test_every_kind_of_part(tmp_path):
-    import trimesh
-
-    trimesh.creation.box((10, 10, 10)).export(tmp_path / "cube.stl")
-    file = tmp_path / "all.toml"
-    file.write_text(
-        """
+EVERY_KIND = """
 clearance = 0.5
+[parts]
+wire = { shape = "cylinder", diameter = 13.87, length = 80 }
+line = { shape = "cylinder", conductor = "LJ-630", length = 80, pose.translation = [0, 100, 0] }
+tube = { shape = "cylinder", radius = 20, bore_diameter = 32.9, length = 10, pose.translation = [0, 100, 0] }
+plate = { shape = "box", size = [30, 30, 5], holes = [{ radius = 3 }], pose.translation = [200, 0, 0] }
+cube = { shape = "mesh", file = "cube.stl", unit = "mm", fit = "off", pose.translation = [200, 0, 7.5] }
+splint = { shape = "clamp-part", part = "P1", pose.translation = [-300, 0, 0] }
 [parts.block]
 shape = "groove-block"
 radius = 7
@@ -55,41 +55,15 @@ width = 60
 height = 20
 grooves = [{ x = 18, radius = 5, half_angle_deg = 50 }]
 holes = [{ diameter = 4, at = [-15, 3], axis = "y" }]
-[parts.wire]
-shape = "cylinder"
-diameter = 13.87
-length = 80
-[parts.line]
-shape = "cylinder"
-conductor = "LJ-630"
-length = 80
-pose = { translation = [0, 100, 0] }
-[parts.tube]
-shape = "cylinder"
-radius = 20
-bore_diameter = 32.9
-length = 10
-pose = { translation = [0, 100, 0] }
-[parts.plate]
-shape = "box"
-size = [30, 30, 5]
-holes = [{ radius = 3 }]
-pose = { translation = [200, 0, 0] }
-[parts.cube]
-shape = "mesh"
-file = "cube.stl"
-unit = "mm"
-fit = "off"
-pose = { translation = [200, 0, 7.5] }
-[parts.splint]
-shape = "clamp-part"
-part = "P1"
-pose = { translation = [-300, 0, 0] }
 [[allowed]]
 parts = ["cube", "pla*"]
-""",
-        encoding="utf-8",
-    )
+"""
+
+
+def test_every_kind_of_part(tmp_path):
+    trimesh.creation.box((10, 10, 10)).export(tmp_path / "cube.stl")
+    file = tmp_path / "all.toml"
+    file.write_text(EVERY_KIND, encoding="utf-8")
     scene = load_scene(file)
     result = check(scene)
     assert result.verdict("block", "wire") is Verdict.CLEARANCE

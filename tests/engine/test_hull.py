@@ -7,13 +7,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clamp3d import Verdict, check, distance
+from clamp3d import Scene, Verdict, check, distance
 from clamp3d.engine.hull import hull, hull_error
-from clamp3d.engine.scene import Scene
-from clamp3d.geometry.mesh import make_mesh
-from clamp3d.geometry.pose import translation
-from clamp3d.geometry.shapes import MeshShape
-from clamp3d.shapes import box
+from clamp3d.kernel import translation
+from clamp3d.shapes import MeshShape, box, make_mesh
 from clamp3d.testing import directions
 
 

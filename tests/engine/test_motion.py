@@ -7,20 +7,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from clamp3d import InputError, Motion, Scene, Verdict, check, first_contact, shapes
 from clamp3d.engine import moving_pair
-from clamp3d.engine.check import check
-from clamp3d.engine.motions import first_contact
-from clamp3d.engine.scene import Scene
-from clamp3d.engine.verdict import Verdict
-from clamp3d.errors import InputError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.mesh import make_mesh
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import SweptArc
-from clamp3d.geometry.shapes import MeshShape
+from clamp3d.kernel import SweptArc, rotation, translation
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
+from clamp3d.shapes import MeshShape, make_mesh
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)

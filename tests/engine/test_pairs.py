@@ -8,15 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clamp3d.engine.answer import Distance
-from clamp3d.engine.check import check
-from clamp3d.engine.distance import distance
-from clamp3d.engine.scene import Scene
-from clamp3d.engine.verdict import Thresholds, Verdict
-from clamp3d.geometry import shapes
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import SweptArc
+from clamp3d import Distance, Motion, Scene, Verdict, check, distance, shapes
+from clamp3d.engine.verdict import Thresholds
+from clamp3d.kernel import SweptArc, rotation, translation
 from tests.kinds import measured_alike
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
@@ -144,10 +138,13 @@ def test_crossed_side_by_side_cylinders_share_a_lens(d):
     assert math.hypot(where.point[0] - d, where.point[1]) <= 5.0
 
 
-def test_a_motion_tells_where_it_is_deepest_and_a_clear_pair_nothing():
+def test_a_motion_tells_where_it_is_deepest_and_is_a_finding():
     scene = Scene().add("a", CUBE).add("b", CUBE, translation(0, 0, 20)).add("c", CUBE, translation(40, 0, 0))
     result = check(Scene(parts=scene.parts, motions=(Motion.translate((0, 0, -12), parts=("b",), name="down"),)))
     (row,) = result.motions
     assert row.where.to_dict()["volume_at_least_mm3"] > 0.0
     assert row.where.box[:, 2].tolist() == pytest.approx([row.where.box[0, 2], 5.0])
     assert all(other.where is None for other in result.pairs)
+    assert [f["motion"] for f in result.to_dict()["findings"]] == [row.motion] == ["down"]
+    assert repr(result) == "CheckResult('scene': not clean; 1 clash, 3 clear)"
+    assert "<td>down</td>" in result._repr_html_()

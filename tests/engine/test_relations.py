@@ -4,13 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from clamp3d import InputError, Part, Scene, check, shapes
 from clamp3d.engine.allowed import Allowed
-from clamp3d.engine.check import check
 from clamp3d.engine.relations import relation
-from clamp3d.engine.scene import Part, Scene
-from clamp3d.errors import InputError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.pose import translation
+from clamp3d.kernel import translation
 
 TURNED = translation(30.0, -7.0, 4.0) @ [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 

@@ -14,20 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d.clamp.assemble import assemble
-from clamp3d.engine.answer import Distance
+from clamp3d import Distance, InputError, Motion, Part, Scene, Verdict, assemble, check_poses, shapes
 from clamp3d.engine.broad import Boxes, near_pairs
 from clamp3d.engine.check import check
-from clamp3d.engine.poses import check_poses
-from clamp3d.engine.scene import Part, Scene
-from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
-from clamp3d.errors import InputError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.mesh import make_mesh
+from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds
 from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, to_target, translation
-from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.pose import to_target
+from clamp3d.kernel import Cylinder, SweptArc, rotation, translation
+from clamp3d.shapes import make_mesh
 from tests.kinds import measured_alike
 
 ROOT = Path(__file__).resolve().parents[2]

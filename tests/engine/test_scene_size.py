@@ -6,11 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from clamp3d.engine.check import check
-from clamp3d.engine.poses import check_poses
-from clamp3d.engine.scene import Scene
-from clamp3d.geometry import shapes
-from clamp3d.geometry.pose import translation
+from clamp3d import Scene, check, check_poses, shapes
+from clamp3d.kernel import translation
 from clamp3d.output.scene_report import check_to_text
 
 SIZES = (100, 400)

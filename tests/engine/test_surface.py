@@ -8,17 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 
-from clamp3d.engine.check import check
+from clamp3d import Scene, Verdict, check, shapes
 from clamp3d.engine.mesh_distance import meshes_distance
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.scene import Scene
 from clamp3d.engine.surface import Surface, at_edges
-from clamp3d.engine.verdict import Verdict
-from clamp3d.geometry import shapes
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.mesh import make_mesh
-from clamp3d.geometry.pose import rotation, translation
 from clamp3d.geometry.profile import Profile
+from clamp3d.kernel import rotation, translation
+from clamp3d.shapes import make_mesh
 
 
 def SHARP(found):

@@ -7,14 +7,11 @@ import pytest
 from hypothesis import HealthCheck, Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
-from clamp3d import first_contact, min_clearance, shapes
+from clamp3d import Motion, distance, first_contact, min_clearance, shapes
 from clamp3d.engine import moving_pair
-from clamp3d.engine.distance import distance
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.swept import swept_lower
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Cylinder
+from clamp3d.kernel import Cylinder, rotation, translation
 from clamp3d.testing import assert_lower_on_way, assert_motion, pose_at
 from tests.kinds import DRAWN, faceted_shape, poses
 

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d.clamp.loader import load_clamp
+from clamp3d import fit_mesh, load_clamp
 from clamp3d.clamp.parts import parts
-from clamp3d.fit.fit import fit_mesh
 from clamp3d.geometry import meshing
-from clamp3d.geometry.mesh import make_mesh
+from clamp3d.shapes import make_mesh
 from tests.fit.fit_shapes import CENTRE_HEIGHT, CENTRES, HALF, LENGTH, RADIUS, off_groove, prism, scan, splint
 
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d.errors import InputError
-from clamp3d.fit.fit import fit_file, fit_mesh
-from clamp3d.geometry.mesh import make_mesh
+from clamp3d import InputError, fit_file, fit_mesh
+from clamp3d.shapes import make_mesh
 from tests.fit.fit_shapes import RADIUS, splint
 
 

@@ -4,12 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clamp3d.engine.motions import first_contact, min_clearance
-from clamp3d.errors import InputError
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.kernel.distance import Feature, signed_distances
+from clamp3d import InputError, Motion, first_contact, min_clearance
+from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, rotation, signed_distances, translation
 
 GROOVE, WIRE = SweptArc(12.0, math.radians(70.0), 50.0), Capsule(10.5, 80.0)
 S, H = 12.0 * math.sin(GROOVE.half_angle), -12.0 * math.cos(GROOVE.half_angle)
@@ -36,6 +32,16 @@ def test_swing_about_an_end_reaches_the_end_edge():
     t = hit.t * 0.5
     assert (12.0 - 25.0 * math.tan(t)) * math.cos(t) == pytest.approx(10.5, abs=1e-12)
     assert hit.contact.feature is Feature.END_ARC
+
+
+def test_a_disc_that_tips_over_a_flat_face_meets_it_with_its_rim():
+    """Its middle stands still: nothing but the tilt of its ends brings it nearer, between two times that are clear."""
+    disc, half, high = Cylinder(8.0, 0.002), 0.001, 7.9
+    start = translation(30.0, H + high, 0.0) @ rotation((0, 0, 1), -0.7) @ rotation((0, 1, 0), math.pi / 2)
+    hit = first_contact(GROOVE, disc, Motion.screw((0, 0, 1), 2.0, point=start[:3, 3]), start)
+    tilt = math.acos(high / math.hypot(8.0, half)) + math.atan(half / 8.0)
+    assert hit.touches
+    assert hit.t == pytest.approx((0.7 - tilt) / 2.0, abs=1e-9)
 
 
 def test_sliding_near_a_surface_is_proven_quickly():

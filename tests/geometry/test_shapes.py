@@ -7,8 +7,7 @@ import pytest
 import trimesh
 from shapely import Polygon
 
-from clamp3d import distance
-from clamp3d.errors import InputError
+from clamp3d import InputError, distance
 from clamp3d.geometry.profile import Profile
 from clamp3d.geometry.shells import volume
 from clamp3d.kernel import rotation, translation

@@ -6,8 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from clamp3d.geometry.pose import rotation
-from clamp3d.kernel import edges
+from clamp3d.kernel import edges, rotation
 from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.vector import Vector
 

@@ -8,9 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.kernel.distance import Feature, signed_distance
+from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, rotation, signed_distance, translation
 from tests.kernel.oracle import surface_distance
 from tests.kinds import poses
 

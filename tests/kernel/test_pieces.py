@@ -3,10 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, SweptArc
-from clamp3d.kernel.distance import signed_distance
-from clamp3d.kernel.pieces import groove_pieces
+from clamp3d.kernel import Capsule, SweptArc, groove_pieces, rotation, signed_distance, translation
 from tests.kernel.oracle import load, surface_distance
 
 CASES = load()
