@@ -60,23 +60,6 @@ def test_a_drawn_solid_lies_between_its_two_meshes(shape, error):
     assert outer.contains(x[body(shape).field(x) < 0.0]).all()
 
 
-@settings(SLOW, max_examples=8)
-@given(
-    st.sampled_from(["chords", "wedges"]),
-    st.sampled_from([2.0, 10.0, 30.0]),
-    st.floats(-3.0, 3.0),
-    st.floats(-2.0, 3.0),
-    st.floats(-1.5, 1.5),
-)
-def test_contact_models_bound_what_they_approximate(name, unit, x, y, turn):
-    wire = shapes.cylinder(5.0, 70.0)
-    model = baselines.contact_model(name, {"block": BLOCK}, unit_angle=math.radians(unit))
-    T = translation(x, y, 0.0) @ rotation((0.0, 0.0, 1.0), turn)
-    found = distance(BLOCK, wire, T, model=model)
-    assert found.lower <= found.value <= found.upper
-    assert_distance(replace(found, point_a=None, normal=None, estimate=None), BLOCK, wire, T)
-
-
 def test_of_a_model_without_known_bounds_none_are_claimed():
     wire, T = shapes.cylinder(5.0, 70.0), translation(0.0, 1.0, 0.0)
     model = baselines.contact_model("mesh", {"block": BLOCK, "cylinder": wire})

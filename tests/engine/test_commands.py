@@ -11,13 +11,9 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 V_BLOCK, HINGE = EXAMPLES / "v-block" / "scene.toml", EXAMPLES / "hinge" / "scene.toml"
 
 SLIDE = """
-[parts.wall]
-shape = "box"
-size = [10, 10, 10]
-[parts.block]
-shape = "box"
-size = [10, 10, 10]
-pose = { translation = [30, 0, 0] }
+[parts]
+wall = { shape = "box", size = [10, 10, 10] }
+block = { shape = "box", size = [10, 10, 10], pose = { translation = [30, 0, 0] } }
 [[motions]]
 name = "slide"
 parts = ["block"]

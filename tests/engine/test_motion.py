@@ -9,19 +9,10 @@ import trimesh
 
 from clamp3d import InputError, Motion, Scene, Verdict, check, first_contact, shapes
 from clamp3d.engine import moving_pair
-from clamp3d.kernel import SweptArc, rotation, translation
+from clamp3d.kernel import rotation, translation
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
 from clamp3d.shapes import MeshShape, make_mesh
-
-GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
-BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
-WIRE = shapes.cylinder(6.935, 80.0)
-
-
-def move(standing, moving, start, motion, cache=None, **settings):
-    scene = Scene(**settings).add("still", standing).add("moving", moving, start)
-    return check(replace(scene, motions=(motion,)), cache=cache).motions
 
 
 @pytest.mark.parametrize("angle", [1e-13, 1e-10, 1e-6, 2.0])
@@ -77,7 +68,8 @@ def test_a_part_that_a_motion_names_twice_moves_once():
 def test_what_counts_as_contact_has_a_first_time(gap):
     """A gap of the contact threshold to rounding is contact."""
     box = shapes.box((10, 10, 10))
-    (row,) = move(box, box, translation(10.0 + gap, 0, 0), Motion.translate((0, 5, 0), parts="moving"), contact=0.01)
+    scene = Scene(contact=0.01).add("still", box).add("moving", box, translation(10.0 + gap, 0, 0))
+    (row,) = check(replace(scene, motions=(Motion.translate((0, 5, 0), parts="moving"),))).motions
     assert (row.verdict.value, row.contact_at) == ("contact", 0.0)
 
 

@@ -80,13 +80,12 @@ def test_ties_are_told_and_smooth_poses_too():
     groove = SweptArc(12.0, math.pi / 3, 50.0)
     tie = generalised_gradient(groove, Cylinder(14.0, 80.0), TIES["both lips, tilted"][2])
     assert not tie.unique
-    assert {Feature.LIP_M, Feature.LIP_N} <= set(tie.features) or {Feature.CORNER_M, Feature.CORNER_N} <= set(
-        tie.features
-    )
-    smooth = generalised_gradient(groove, Cylinder(5.0, 80.0), translation(2.0, -3.0, 1.0) @ rotation((1, 2, 0), 0.1))
+    assert {Feature.CORNER_M, Feature.CORNER_N} <= set(tie.features)
+    T = translation(2.0, -3.0, 1.0) @ rotation((1, 2, 0), 0.1)
+    smooth = generalised_gradient(groove, Cylinder(5.0, 80.0), T)
     assert smooth.unique
     assert np.array_equal(smooth.rates[0], smooth.nearest.gradient)
-    assert signed_distance(groove, Cylinder(5.0, 80.0), translation(2.0, -3.0, 1.0) @ rotation((1, 2, 0), 0.1)).unique
+    assert signed_distance(groove, Cylinder(5.0, 80.0), T).unique
     assert not signed_distance(groove, Cylinder(14.0, 80.0), TIES["both lips"][2]).unique
 
 
