@@ -73,19 +73,16 @@ def test_small_differences_survive_a_large_offset() -> None:
     assert contact.gap_left == -(2.0**-30)
 
 
-@pytest.mark.parametrize("tolerance", [-1.0, math.nan, math.inf])
-def test_bad_tolerance(tolerance: float) -> None:
-    with pytest.raises(InputError, match="tolerance"):
-        hole_bolt(Rectangle(0.0, 0.0, W, H), BOLT, tolerance=tolerance)
-
-
-def test_bad_rectangles() -> None:
+def test_bad_rectangles_and_tolerances() -> None:
     with pytest.raises(InputError, match="half_width must be a finite length > 0 mm, got -1"):
         Rectangle(0.0, 0.0, -1.0, 1.0)
     with pytest.raises(InputError, match="x must be a finite number"):
         Rectangle(math.nan, 0.0, 1.0, 1.0)
     with pytest.raises(InputError, match="less than 90 deg"):
         hole_bolt(Rectangle(0.0, 0.0, W, H, math.pi / 2), BOLT, tolerance=TOL)
+    for tolerance in (-1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="tolerance"):
+            hole_bolt(Rectangle(0.0, 0.0, W, H), BOLT, tolerance=tolerance)
 
 
 def corners(r: Rectangle) -> list[tuple[float, float]]:
