@@ -12,16 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError
 from clamp3d.geometry.pose import PoseWarning, check_pose, check_pose_array, inverse, nearest_rigid, turn_of
-from clamp3d.kernel import (
-    Capsule,
-    Cylinder,
-    SweptArc,
-    groove_pieces,
-    rotation,
-    signed_distance,
-    signed_distances,
-    translation,
-)
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, rotation, translation
+from clamp3d.kernel.distance import signed_distance, signed_distances
+from clamp3d.kernel.pieces import groove_pieces
 
 GROOVE, WIRE = SweptArc(12.0, 1.2, 50.0), Cylinder(10.5, 80.0)
 

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.kernel import features, nearest
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, features, nearest, rotation, translation
 from clamp3d.kernel.distance import Feature, signed_distance, signed_distances
 from clamp3d.kernel.relation import relative_pose
 from clamp3d.kernel.vector import Vector

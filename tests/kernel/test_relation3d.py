@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, rotation, translation
 from clamp3d.kernel.arc_and_circle import ArcRelation, arc_circle
 from clamp3d.kernel.relation import Relation3D, groove_relation
 

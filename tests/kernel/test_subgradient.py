@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, rotation, translation
 from clamp3d.kernel.distance import Feature, signed_distance, signed_distances
 from clamp3d.kernel.subgradient import generalised_gradient
 from tests.kernel.test_flat import random_scene
