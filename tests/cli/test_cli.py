@@ -134,8 +134,11 @@ def test_undecided(tmp_path, whole_main):
     )
     code, out, _ = whole_main("check", scene, "--json", "-")
     data = json.loads(out)
-    assert [row["verdict"] for row in data["pairs"]] == ["uncertain"]
     assert (code, data["clean"]) == (3, False)
+    assert {"headline", "scene", "thresholds", "counts", "findings", "parts", "motions"} <= set(data)
+    (row,) = data["pairs"]
+    assert {"distance_mm", "at_least_mm", "at_most_mm", "point_a", "normal", "depth_mm", "method"} <= set(row)
+    assert row["verdict"] == "uncertain"
     assert whole_main("report", scene, "--output", tmp_path / "report", "-q")[0] == 3
 
 

@@ -399,19 +399,19 @@ def test_served_page_follows_the_run_and_measures_between_the_stops(browser, run
         viewer.finish(run)
         wait_for(page, 'document.getElementById("headline").textContent === "clamped"')
         wait_for(page, "viewer.animator.playing")
-        first, second = viewer.story["stops"][:2]
-        seconds = (first["leave"] + second["arrive"]) / 2
-        seek(page, seconds)
-        seconds = page.evaluate("viewer.animator.time")  # to a thousandth
-        wait_for(page, "document.querySelectorAll('#now tr').length === 21")
-        page.wait_for_timeout(500)  # what was measured while it played comes first
-        cells = "[...document.querySelectorAll('#now tr')].map((tr) => [1, 2].map((k) => tr.cells[k].textContent))"
-        shown = dict(page.evaluate(cells))
-        poses = {name: pose_in_browser(page, ["parts", name]) for name in run.poses}  # three.js has single precision
-        truth = measure(run.scene.moved({name: nearest_rigid(T[None])[0] for name, T in poses.items()}))
-        for row in viewer.answer({"time": str(seconds)})["rows"]:
-            assert shown[f"{row['a']}\u2013{row['b']}"] == row["gap"]
-            assert row["distance_mm"] == pytest.approx(truth[row["a"], row["b"]].upper, abs=1e-3)
+        for k in (1, 5):  # on a straight way, and while the nut is turned
+            before, stop = viewer.story["stops"][k - 1 : k + 1]
+            seek(page, 0.4 * before["leave"] + 0.6 * stop["arrive"])
+            seconds = page.evaluate("viewer.animator.time")  # to a thousandth
+            wait_for(page, "document.querySelectorAll('#now tr').length === 21")
+            page.wait_for_timeout(500)  # what was measured while it played comes first
+            cells = "[...document.querySelectorAll('#now tr')].map((tr) => [1, 2].map((k) => tr.cells[k].textContent))"
+            shown = dict(page.evaluate(cells))
+            poses = {name: pose_in_browser(page, ["parts", name]) for name in run.poses}  # three.js: single precision
+            truth = measure(run.scene.moved({name: nearest_rigid(T[None])[0] for name, T in poses.items()}))
+            for row in viewer.answer({"time": str(seconds)})["rows"]:
+                assert shown[f"{row['a']}\u2013{row['b']}"] == row["gap"]
+                assert row["distance_mm"] == pytest.approx(truth[row["a"], row["b"]].upper, abs=1e-3)
         go_to(page, len(run.path) - 1)
         assert_drawn(page, run.poses)
     page.wait_for_timeout(500)
