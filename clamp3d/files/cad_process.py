@@ -12,20 +12,22 @@ from clamp3d.files.worker import process
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-_COMMON_SECONDS = 5.0
-"""Time limit of a common part, which Open CASCADE does not always find between round faces that all but coincide.
+_PATIENCE = 10.0
+"""Seconds in which a process of a busy machine gets one second of processor time."""
+_QUICK_SECONDS, _COMMON_SECONDS = 1.0, 5.0
+"""Time limits of a common part, which Open CASCADE does not always find between round faces that all but coincide.
 
 Where it does not end, finer meshes decide.
 """
 
 
 def _there(function: Callable[_P, _R], seconds: float = 300.0) -> Callable[_P, _R]:
-    """The function, answered in the process within so many seconds; a few hundred milliseconds are usual."""
+    """The function, answered in the process within so much processor time; a few hundred milliseconds are usual."""
 
     def call(*arguments: _P.args, **_: _P.kwargs) -> _R:
         name = f"{function.__module__}:{function.__name__}"
         try:
-            result: _R = process().call(name, *arguments, time_limit=seconds)
+            result: _R = process().call(name, *arguments, time_limit=_PATIENCE * seconds, cpu=seconds)
             return result
         except WorkerEndedError as error:
             raise SolverError(f"Open CASCADE ended with {error.ending}") from None
@@ -40,4 +42,5 @@ surfaces = _there(faces.surfaces)
 bounds_at = _there(open_cascade.bounds_at)
 distance = _there(pairs.distance)
 common = _there(pairs.common, _COMMON_SECONDS)
+quick_common = _there(pairs.common, _QUICK_SECONDS)
 depths = _there(pairs.depths)

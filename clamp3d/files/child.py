@@ -24,6 +24,8 @@ from clamp3d.errors import Clamp3dError
 
 _OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "Memory allocation")
 """What a process prints that ends for want of memory: C++, Python, OpenBLAS."""
+_CPU_SIGNAL = getattr(signal, "SIGPROF", 0)
+"""What ends a process that has used its processor time; Windows has none."""
 _FORBIDDEN = ("socket.connect", "socket.getaddrinfo", "socket.bind", "subprocess.", "os.system", "os.exec", "os.fork")
 
 
@@ -82,7 +84,9 @@ class Worker:
         """The last lines that the process printed."""
         return [line for line in list(self._lines) if line]
 
-    def call(self, function: str, *arguments: Any, time_limit: float, memory: float | None = None) -> Any:
+    def call(
+        self, function: str, *arguments: Any, time_limit: float, cpu: float | None = None, memory: float | None = None
+    ) -> Any:
         """The result of ``function(*arguments)`` in the process.
 
         Parameters
@@ -93,6 +97,9 @@ class Worker:
             Whatever pickle holds, as the result.
         time_limit : float
             Seconds after which the process is ended.
+        cpu : float, optional
+            Processor seconds after which it is ended too, where the system can limit that: however busy the machine is,
+            the same calls are answered.
         memory : float, optional
             Bytes that this call may take beyond what the process has, where the system can limit that.
 
@@ -103,7 +110,7 @@ class Worker:
         MemoryError
             If the call takes more than ``memory``.
         WorkerTimeoutError, WorkerEndedError
-            If there is no answer within ``time_limit``, or the process ended by itself.
+            If there is no answer within ``time_limit`` or ``cpu``, or the process ended by itself.
         RuntimeError
             For any other exception of the function; the message names its type and place.
         """
@@ -111,7 +118,7 @@ class Worker:
             try:
                 if self._process is None or self._process.poll() is not None:
                     self._process = self._start()
-                error, result = self._exchange(self._process, (function, arguments, memory), time_limit)
+                error, result = self._exchange(self._process, (function, arguments, memory, cpu), time_limit)
             except BaseException:  # also for Ctrl-C: the process may still be at work
                 self.close()
                 raise
@@ -167,8 +174,8 @@ class Worker:
             code = process.wait()
         finally:
             timer.cancel()
-        if time.monotonic() >= deadline:
-            raise WorkerTimeoutError(f"no answer in {time_limit:g} s")
+        if time.monotonic() >= deadline or code == -_CPU_SIGNAL:
+            raise WorkerTimeoutError("no answer in its time")
         self._listener.join(timeout=5.0)
         if any(word in line for line in self.log for word in _OUT_OF_MEMORY):
             raise MemoryError
@@ -182,7 +189,7 @@ def serve(*, confined: bool) -> None:
     os.dup2(2, 1)  # what a library prints goes to the log
     if confined:
         sys.addaudithook(_refuse)
-    requests: queue.SimpleQueue[tuple[str, tuple[Any, ...], float | None]] = queue.SimpleQueue()
+    requests: queue.SimpleQueue[tuple[str, tuple[Any, ...], float | None, float | None]] = queue.SimpleQueue()
 
     def receive() -> None:
         with suppress(EOFError, pickle.UnpicklingError):
@@ -192,9 +199,12 @@ def serve(*, confined: bool) -> None:
 
     threading.Thread(target=receive, daemon=True).start()
     while True:
-        function, arguments, memory = requests.get()
+        function, arguments, memory, cpu = requests.get()
         _limit(memory)
-        _send(outgoing, _answer(function, arguments))
+        _limit_cpu(cpu)
+        answer = _answer(function, arguments)
+        _limit_cpu(None)
+        _send(outgoing, answer)
 
 
 def _answer(function: str, arguments: tuple[Any, ...]) -> bytes:
@@ -234,6 +244,12 @@ def _limit(memory: float | None) -> None:
         if hard != resource.RLIM_INFINITY:
             value = hard if value == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(kind, (value, hard))
+
+
+def _limit_cpu(seconds: float | None) -> None:
+    """End this process after so much more processor time, where the system can; None: never."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
 
 
 def _send(pipe: IO[bytes], message: bytes) -> None:

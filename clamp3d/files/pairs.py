@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,10 +56,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     With ``share`` its border is meshed, with chords that are ``share`` of its thickness, volume over area, or of its
     size divided by `_SLENDER`. Raises Clamp3dError if Open CASCADE cannot make it.
     """
-    operation = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), T))
-    if not operation.IsDone():
-        raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
-    shape = operation.Shape()
+    shape = _common_shape(a, b, np.asarray(T).tobytes())
     if next(explore(shape, "SOLID"), None) is None:
         return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
@@ -68,6 +66,15 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
     samples = [_samples(face, k) for k, face in enumerate(explore(shape, "FACE"))]
     return CommonPart(volume, area, box, np.vstack([points for points, _ in samples]), max(off for _, off in samples))
+
+
+@lru_cache(maxsize=64)
+def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
+    """The common part as a TopoDS_Shape, kept for who asks for its depth, its volume or finer samples."""
+    operation = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), np.frombuffer(pose).reshape(4, 4)))
+    if not operation.IsDone():
+        raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
+    return operation.Shape()
 
 
 def _samples(face: Any, number: int) -> tuple[Array, float]:

@@ -14,6 +14,7 @@ from clamp3d.files.worker import process
 
 STAND_IN = """
 import os
+import time
 from clamp3d.errors import InputError, SolverError
 
 def fail(kind):
@@ -21,6 +22,11 @@ def fail(kind):
 
 def pid():
     return os.getpid()
+
+def work(seconds):
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
 """
 
 
@@ -48,6 +54,15 @@ def test_one_process_answers_until_it_fails_and_the_next_call_starts_another(wor
     with pytest.raises(WorkerTimeoutError):
         worker.call("time:sleep", 600, time_limit=0.5)
     assert worker.call("stand_in:pid", time_limit=60.0) != first
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no processor time")
+def test_processor_time_is_limited_for_each_call_alone(worker):
+    worker.call("time:sleep", 0.6, time_limit=60.0, cpu=0.3)
+    for _ in range(2):
+        worker.call("stand_in:work", 0.2, time_limit=60.0, cpu=0.3)
+    with pytest.raises(WorkerTimeoutError):
+        worker.call("stand_in:work", 600.0, time_limit=600.0, cpu=0.3)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")

@@ -232,9 +232,10 @@ def box_on_its_corner(rng, gap):
 
 
 def hexagon_in_hexagon(rng, gap):
-    """A hexagonal bar in a socket: parallel faces."""
+    """A hexagonal bar in a socket: parallel faces; in an overlap the bar's edges are deepest."""
     r = rng.uniform(4.0, 9.0)
-    return cut(rod(r + 8, -8, 0), hexagon(r + gap, -9, 1)), hexagon(r, -12, 5)
+    wider = gap if gap > 0.0 else gap * math.cos(math.pi / 6)
+    return cut(rod(r + 8, -8, 0), hexagon(r + wider, -9, 1)), hexagon(r, -12, 5)
 
 
 def hexagon_in_bore(rng, gap):
