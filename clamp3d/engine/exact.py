@@ -5,25 +5,26 @@ Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import common
+from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.pairs import TOLERANCE, CommonPart
-from clamp3d.geometry.pose import Array, to_source
+from clamp3d.geometry.pose import Array, inverse, to_source
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
+_NARROW = 9e-3
+"""Overlap (mm) that Open CASCADE may miss where no faces touch all along: 0.005 mm of a ball in a cone were seen."""
 _PROBED = 8
-"""Points of the coarse common part, those that look deepest, by which it is told whether it was left out."""
-_TRIED = 24
-"""Points of the common part's border whose depth is measured exactly: as many of those that look deepest by the meshes,
-and of all that may be the deepest.
-"""
+"""Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
 
 
 def exact_distance(a: Model, b: Model, T: Array) -> Distance:
@@ -36,11 +37,50 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
     return Distance(gap - TOLERANCE, gap + TOLERANCE, p, q, (q - p) / np.linalg.norm(q - p), None, "exact", METHOD)
 
 
-def exact_overlap(a: Model, b: Model, T: Array, share: float, *, quick: bool = False) -> Distance:
+class Probe(NamedTuple):
+    """Points that were looked at: how deep (mm) one lies in one solid, being in the other, and one in both of them."""
+
+    overlap: Distance
+    in_both: float
+
+
+def exact_probe(a: Model, b: Model, T: Array) -> Probe:
+    """How deep some points of the common part of coarse meshes lie in two solids that touch or overlap.
+
+    The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
+    """
+    assert a.exact is not None
+    assert b.exact is not None
+    nothing = Probe(Distance(level="exact", method=METHOD), 0.0)
+    if not (a.chords and b.chords):
+        return nothing
+    coarse = [model.outer(model.chords[0]) for model in (a, b)]
+    shared = common(coarse[0], coarse[1], T)
+    if shared is None:
+        return nothing
+    points = np.vstack([shared.vertices, shared.inner_points()])
+    looks = [coarse[0].distance(points), coarse[1].distance(to_source(T, points))]
+    orders = [np.argsort(-look, kind="stable")[:_PROBED] for look in (np.minimum(*looks), np.maximum(*looks))]
+    points = points[np.concatenate(orders)]
+    in_a = cad_process.depths(a.exact.brep, points)
+    in_b = cad_process.depths(b.exact.brep, to_source(T, points))
+    attested = _attested(in_a, in_b)
+    k = int(np.argmax(attested))
+    overlap = Distance(-np.inf, TOLERANCE - float(attested[k]), points[k], points[k], None, None, "exact", METHOD)
+    return Probe(overlap, float(np.minimum(in_a, in_b).max(initial=0.0)))
+
+
+def _attested(in_a: Array, in_b: Array) -> Array:
+    """Depths (k,) of an overlap that points attest which lie so deep in two solids, 0 where one is beside of them."""
+    return np.where(np.minimum(in_a, in_b) >= -2.0 * TOLERANCE, np.maximum(in_a, in_b), 0.0)
+
+
+def exact_overlap(a: Model, b: Model, T: Array, share: float, *, quick: bool = False, in_both: float = 0.0) -> Distance:
     """Bounds of the interference of solids that touch or overlap, from points of the border of their common part.
 
     ``share``: how far between the points that border may be off straight lines, of the common part's thickness.
-    ``quick``: nothing is known if it takes more than a second to find.
+    ``quick``: nothing is known if it takes more than a second to find, or is missing although no faces touch all along.
+    ``in_both``: how deep (mm) a point lies in both: then there is a common part, also where Open CASCADE misses it.
     """
     assert a.exact is not None
     assert b.exact is not None
@@ -50,58 +90,51 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float, *, quick: bool = F
         shared = find(a.exact.brep, b.exact.brep, T, share)
     except Clamp3dError:  # it takes too long, or fails
         return unknown
-    if shared.volume <= TOLERANCE * max(1e-12, shared.area) or not len(shared.points):
-        missed = _missed(a, b, T)
-        return unknown if missed > _FAINT else Distance(-TOLERANCE - missed, level="exact", method=METHOD)
-    points = _deep_points(a, b, T, shared)
-    if points is None:
-        return unknown
+    if shared.volume <= TOLERANCE * max(1e-12, shared.area):
+        narrow = not _faces_coincide(a, b, T)
+        if in_both > _FAINT or (quick and narrow):
+            return unknown
+        return Distance(-(_NARROW if narrow else in_both) - TOLERANCE, level="exact", method=METHOD)
+    points, at_most = _depth_bounds(shared)
+    order = np.argsort(-at_most, kind="stable")
+    spread = order[np.linspace(0, len(order) - 1, _PROBED).round().astype(int)]
+    tried = np.unique(np.concatenate([order[:_PROBED], spread]))
+    points = points[tried]
     in_a = cad_process.depths(a.exact.brep, points)
     in_b = cad_process.depths(b.exact.brep, to_source(T, points))
-    # Between the points both surfaces are within a chord of straight lines, so nothing is much deeper.
-    most = float(np.maximum(np.abs(in_a), np.abs(in_b)).max()) + 2.0 * shared.chord
-    # A point near the border, which is only that well known, may lie beside the part and attests nothing.
-    attested = np.where(np.minimum(in_a, in_b) >= -2.0 * TOLERANCE, np.maximum(in_a, in_b), 0.0)
+    at_most[tried] = np.maximum(np.abs(in_a), np.abs(in_b))
+    # Between the points the border is within a chord of straight lines, so nothing is much deeper. Some of what
+    # Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
+    most = float(at_most.max()) + shared.chord + max(0.0, -float(np.minimum(in_a, in_b).min()))
+    attested = _attested(in_a, in_b)
     k = int(np.argmax(attested))
     upper = TOLERANCE - float(attested[k])
     return Distance(-most - TOLERANCE, upper, points[k], points[k], None, None, "exact", METHOD)
 
 
-def _missed(a: Model, b: Model, T: Array) -> float:
-    """How deep (mm) points of the common part of coarse meshes lie in both of two solids that seem only to touch."""
+def _faces_coincide(a: Model, b: Model, T: Array) -> bool:
+    """Whether corners of a coarse mesh, which are on one solid, lie on the surface of the other too."""
     assert a.exact is not None
     assert b.exact is not None
     if not (a.chords and b.chords):
-        return 0.0
-    coarse = [model.outer(model.chords[0]) for model in (a, b)]
-    shared = common(coarse[0], coarse[1], T)
-    if shared is None:
-        return 0.0
-    points = np.vstack([shared.vertices, shared.inner_points()])
-    looks = np.minimum(coarse[0].distance(points), coarse[1].distance(to_source(T, points)))
-    points = points[np.argsort(-looks, kind="stable")[:_PROBED]]
-    in_a = cad_process.depths(a.exact.brep, points)
-    in_b = cad_process.depths(b.exact.brep, to_source(T, points))
-    return float(np.minimum(in_a, in_b).max(initial=0.0))
+        return False
+    on_a, on_b = (model.outer(model.chords[0]) for model in (a, b))
+    for own, other, solid, pose in ((on_a, on_b, b.exact, T), (on_b, on_a, a.exact, inverse(T))):
+        corners = to_source(pose, own.vertices)
+        nearest = corners[np.argsort(other.distance(corners), kind="stable")[:_PROBED]]
+        if (np.abs(cad_process.depths(solid.brep, nearest)) <= 10.0 * TOLERANCE).any():
+            return True
+    return False
 
 
-def _deep_points(a: Model, b: Model, T: Array, shared: CommonPart) -> Array | None:
-    """Points (k, 3) of the common part's border that may be the deepest.
+def _depth_bounds(shared: CommonPart) -> tuple[Array, Array]:
+    """Points (n, 3) of a common part's border, and how deep (n,) mm each can lie in the other solid.
 
-    None where some of the border does not lie in both by their meshes: Open CASCADE was wrong.
+    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     """
-    points = shared.points
-    local = to_source(T, points)
-    looks, slack = np.zeros(len(points)), np.inf
-    if a.chords and b.chords:
-        sides = ((a.outer(a.chords[-1]), points), (b.outer(b.chords[-1]), local))
-        away = [surface.distance(seen) for surface, seen in sides]
-        for (surface, seen), far in zip(sides, away, strict=True):
-            outside = far > surface.error + shared.chord + 2.0 * TOLERANCE
-            if not surface.contains(seen[outside]).all():
-                return None
-        looks, slack = np.maximum(*away), 2.0 * sum(surface.error for surface, _ in sides)
-    order = np.argsort(-looks, kind="stable")
-    order = order[looks[order] >= looks.max() - slack]
-    spread = order[np.linspace(0, len(order) - 1, min(len(order), _TRIED)).round().astype(int)]
-    return np.asarray(points[np.concatenate([order[:_TRIED], spread])])
+    on_a, on_b = shared.borders
+    depths = []
+    for own, other in ((on_a, on_b), (on_b, on_a)):
+        surface = Surface(other.points, other.triangles)
+        depths.append(surface.distance(own.points) if len(other.points) else np.full(len(own.points), np.inf))
+    return np.vstack([on_a.points, on_b.points]), np.concatenate(depths) + shared.chord

@@ -72,8 +72,8 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     if not _boxes_allow(inner, outer, T, contact):
         return False
     inner.counters.queries["containment"] += 1
-    slack = 0.0
-    for level in (0, -1):  # coarse meshes mostly tell that it does not
+    both_exact = inner.exact is not None and outer.exact is not None
+    for level in (0,) if both_exact else (0, -1):  # coarse meshes mostly tell that it does not
         small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
         if large is None:
             return False
@@ -81,9 +81,9 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
         slack = small.error + large.error + sum(m.chords[level] for m in (inner, outer) if m.bracketed)
         if not within(small, large, T, contact + slack):
             return False
-    if slack <= contact or inner.exact is None or outer.exact is None:
+    if inner.exact is None or outer.exact is None:
         return True
-    # The meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
+    # Meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
     shared = cad_process.common(outer.exact.brep, inner.exact.brep, T)
     return shared.volume >= inner.exact.volume - contact * shared.area
 

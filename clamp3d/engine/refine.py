@@ -25,8 +25,8 @@ from clamp3d.geometry.pose import Array, inverse
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
 
-SHARES = (0.04, 0.015)
-"""Chords of the border of a common part, of its thickness: the first is quick, the second takes up to seconds."""
+SHARES = (0.04, 0.015, 0.004)
+"""Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
 
 Enough = Callable[[Distance], bool]
 
@@ -82,17 +82,19 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tup
 
     Open CASCADE mostly takes less time for one pair than fine meshes of both, but not always for a common part.
     """
-    from clamp3d.engine.exact import exact_distance, exact_overlap
+    from clamp3d.engine.exact import exact_distance, exact_overlap, exact_probe
 
     chords = _chords(a, b)
     for chord in chords[:1]:
         yield "meshes", meshes_distance(a, b, T, chord, enough)
     yield "exact", exact_distance(a, b, T)
-    yield "exact", exact_overlap(a, b, T, SHARES[0], quick=True)
+    probe = exact_probe(a, b, T)
+    yield "exact", probe.overlap
+    yield "exact", exact_overlap(a, b, T, SHARES[0], quick=True, in_both=probe.in_both)
     for chord in chords[1:]:
         yield "meshes", meshes_distance(a, b, T, chord, enough)
     for share in SHARES:
-        yield "exact", exact_overlap(a, b, T, share)
+        yield "exact", exact_overlap(a, b, T, share, in_both=probe.in_both)
     for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
         yield "meshes", meshes_distance(a, b, T, chord, enough, thorough=True)
 

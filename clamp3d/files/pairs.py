@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, volume_of
 from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.mesh import Array, IntArray
 
 TOLERANCE = 1e-6
 """Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
@@ -25,17 +25,25 @@ _SAMPLES = 500
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Border:
+    """What of a common part's border lies on one solid, as triangles: ``points`` (n, 3), ``triangles`` (m, 3)."""
+
+    points: Array
+    triangles: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CommonPart:
     """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
 
-    ``points`` (n, 3), if any, lie on its border, which is within ``chord`` mm of triangles between them.
+    ``borders``, if any, are on the first and on the second solid, within ``chord`` mm of their triangles.
     """
 
     volume: float
     area: float
     box: Array
-    points: Array
-    chord: float
+    borders: tuple[Border, ...] = ()
+    chord: float = 0.0
 
 
 def distance(a: bytes, b: bytes, T: Array) -> tuple[float, Array, Array]:
@@ -58,14 +66,32 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     """
     shape = _common_shape(a, b, np.asarray(T).tobytes())
     if next(explore(shape, "SOLID"), None) is None:
-        return CommonPart(0.0, 0.0, np.zeros((2, 3)), np.empty((0, 3)), 0.0)
+        return CommonPart(0.0, 0.0, np.zeros((2, 3)))
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
     if share is None:
-        return CommonPart(volume, area, box, np.empty((0, 3)), 0.0)
+        return CommonPart(volume, area, box)
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
     occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
-    samples = [_samples(face, k) for k, face in enumerate(explore(shape, "FACE"))]
-    return CommonPart(volume, area, box, np.vstack([points for points, _ in samples]), max(off for _, off in samples))
+    solids = from_bytes(a), moved(from_bytes(b), T)
+    sides: tuple[list[tuple[Array, IntArray]], ...] = ([], [])
+    chord = 0.0
+    for k, face in enumerate(explore(shape, "FACE")):
+        points, quads = _samples(face, k)
+        chord = max(chord, float(_heights(points[quads]).max(initial=0.0)))
+        middle = points[quads[len(quads) // 2, 3]] if len(quads) else np.zeros(3)
+        away = [_from_surface(solid, middle) for solid in solids]
+        for side, distance in zip(sides, away, strict=True):
+            if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
+                side.append((points, quads[:, :3]))
+    return CommonPart(volume, area, box, tuple(map(_joined, sides)), chord)
+
+
+def _joined(side: list[tuple[Array, IntArray]]) -> Border:
+    """Samples of some faces as one."""
+    starts = np.cumsum([0, *(len(points) for points, _ in side)])
+    triangles = [rows + start for (_, rows), start in zip(side, starts, strict=False)]
+    no_rows = np.empty((0, 3), dtype=np.int64)
+    return Border(np.vstack([np.empty((0, 3)), *(points for points, _ in side)]), np.vstack([no_rows, *triangles]))
 
 
 @lru_cache(maxsize=64)
@@ -77,8 +103,8 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, number: int) -> tuple[Array, float]:
-    """Points (n, 3) of a meshed face, at least some hundreds, and how far (mm) triangles between them are from it.
+def _samples(face: Any, number: int) -> tuple[Array, IntArray]:
+    """Points (n, 3) of a meshed face, and those (m, 4) of each triangle, at its corners and in its middle.
 
     Meshes of a face may have no point inside of it, so its triangles are cut in the surface's parameters.
     """
@@ -90,8 +116,7 @@ def _samples(face: Any, number: int) -> tuple[Array, float]:
         corners = np.concatenate([middles, *at_corners])
     everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
     uv, place = np.unique(everything, axis=0, return_inverse=True)  # triangles share their corners
-    points = points_on(face, uv)
-    return points, float(_heights(points[place.reshape(-1, 4)]).max(initial=0.0))
+    return points_on(face, uv), place.reshape(-1, 4)
 
 
 def _heights(points: Array) -> Array:
@@ -106,12 +131,16 @@ def _heights(points: Array) -> Array:
 def depths(brep: bytes, points: Array) -> Array:
     """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
     shape = from_bytes(brep)
-    shells, side = [*explore(shape, "SHELL")], occ.BRepClass3d_SolidClassifier(shape)
-    signed = np.empty(len(points))
+    side = occ.BRepClass3d_SolidClassifier(shape)
+    signed = np.array([_from_surface(shape, point) for point in points])
     for k, point in enumerate(points.tolist()):
-        vertex = occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point)).Vertex()
-        signed[k] = min(occ.BRepExtrema_DistShapeShape(shell, vertex).Value() for shell in shells)
         side.Perform(occ.gp_Pnt(*point), TOLERANCE)
         if side.State() == occ.TopAbs_State.TopAbs_OUT:
             signed[k] = -signed[k]
     return signed
+
+
+def _from_surface(solid: Any, point: Array) -> float:
+    """Distance (mm) of a point (3,) from the surface of a solid, on either side."""
+    vertex = occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
+    return min(float(occ.BRepExtrema_DistShapeShape(shell, vertex).Value()) for shell in explore(solid, "SHELL"))

@@ -425,7 +425,7 @@ def judge(pairs, result):
 
 
 def holds(pair, row, slack=1e-6):
-    """Whether the bounds of a pair that is apart hold the formula's distance."""
-    if row is None or pair.gap < 0.0 or pair.right is OVERLAPS:
+    """Whether the bounds of a pair hold the formula's distance, or minus its depth."""
+    if row is None or pair.right is OVERLAPS:
         return True
     return row.distance.lower - slack <= pair.gap <= row.distance.upper + slack
