@@ -1,4 +1,4 @@
-"""Two solids from CAD by Open CASCADE, in its process: the last level, for pairs that the meshes leave open.
+"""Two solids from CAD by Open CASCADE, in its process, for pairs that coarse meshes leave open.
 
 Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name says whose answer it is.
 """
