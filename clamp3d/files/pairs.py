@@ -20,6 +20,8 @@ _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
 
 
+_AT_EDGES = 9.0 / 4.0
+"""How many times as far as in a triangle's middle a quadratic surface can be from it, at the middle of an edge."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
 
@@ -77,7 +79,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     chord = 0.0
     for k, face in enumerate(explore(shape, "FACE")):
         points, quads = _samples(face, k)
-        chord = max(chord, float(_heights(points[quads]).max(initial=0.0)))
+        chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max(initial=0.0)))
         middle = points[quads[len(quads) // 2, 3]] if len(quads) else np.zeros(3)
         away = [_from_surface(solid, middle) for solid in solids]
         for side, distance in zip(sides, away, strict=True):
