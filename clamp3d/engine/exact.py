@@ -5,6 +5,7 @@ Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,8 +50,6 @@ def exact_probe(a: Model, b: Model, T: Array) -> Probe:
 
     The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
     """
-    assert a.exact is not None
-    assert b.exact is not None
     nothing = Probe(Distance(level="exact", method=METHOD), 0.0)
     if not (a.chords and b.chords):
         return nothing
@@ -62,17 +61,23 @@ def exact_probe(a: Model, b: Model, T: Array) -> Probe:
     looks = [coarse[0].distance(points), coarse[1].distance(to_source(T, points))]
     orders = [np.argsort(-look, kind="stable")[:_PROBED] for look in (np.minimum(*looks), np.maximum(*looks))]
     points = points[np.concatenate(orders)]
+    depths = _depths(a, b, T, points)
+    return Probe(_attested(points, depths), float(depths.min(axis=0).max(initial=0.0)))
+
+
+def _depths(a: Model, b: Model, T: Array, points: Array) -> Array:
+    """Signed depths (2, k) of points (k, 3) of a's frame in each of two solids, negative outside."""
+    assert a.exact is not None
+    assert b.exact is not None
     in_a = cad_process.depths(a.exact.brep, points)
-    in_b = cad_process.depths(b.exact.brep, to_source(T, points))
-    attested = _attested(in_a, in_b)
-    k = int(np.argmax(attested))
-    overlap = Distance(-np.inf, TOLERANCE - float(attested[k]), points[k], points[k], None, None, "exact", METHOD)
-    return Probe(overlap, float(np.minimum(in_a, in_b).max(initial=0.0)))
+    return np.stack([in_a, cad_process.depths(b.exact.brep, to_source(T, points))])
 
 
-def _attested(in_a: Array, in_b: Array) -> Array:
-    """Depths (k,) of an overlap that points attest which lie so deep in two solids, 0 where one is beside of them."""
-    return np.where(np.minimum(in_a, in_b) >= -2.0 * TOLERANCE, np.maximum(in_a, in_b), 0.0)
+def _attested(points: Array, depths: Array) -> Distance:
+    """The overlap that the deepest of points (k, 3) attests; one that lies beside a solid attests none."""
+    overlaps = np.where(depths.min(axis=0) >= -2.0 * TOLERANCE, depths.max(axis=0), 0.0)
+    k = int(np.argmax(overlaps))
+    return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
 
 
 def exact_overlap(a: Model, b: Model, T: Array, share: float, *, quick: bool = False, in_both: float = 0.0) -> Distance:
@@ -99,17 +104,12 @@ def exact_overlap(a: Model, b: Model, T: Array, share: float, *, quick: bool = F
     order = np.argsort(-at_most, kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).round().astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    points = points[tried]
-    in_a = cad_process.depths(a.exact.brep, points)
-    in_b = cad_process.depths(b.exact.brep, to_source(T, points))
-    at_most[tried] = np.maximum(np.abs(in_a), np.abs(in_b))
+    depths = _depths(a, b, T, points[tried])
+    at_most[tried] = np.abs(depths).max(axis=0)
     # Between the points the border is within a chord of straight lines, so nothing is much deeper. Some of what
     # Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
-    most = float(at_most.max()) + shared.chord + max(0.0, -float(np.minimum(in_a, in_b).min()))
-    attested = _attested(in_a, in_b)
-    k = int(np.argmax(attested))
-    upper = TOLERANCE - float(attested[k])
-    return Distance(-most - TOLERANCE, upper, points[k], points[k], None, None, "exact", METHOD)
+    most = float(at_most.max()) + shared.chord + max(0.0, -float(depths.min()))
+    return replace(_attested(points[tried], depths), lower=-most - TOLERANCE)
 
 
 def _faces_coincide(a: Model, b: Model, T: Array) -> bool:

@@ -90,13 +90,16 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tup
     yield "exact", exact_distance(a, b, T)
     probe = exact_probe(a, b, T)
     yield "exact", probe.overlap
-    yield "exact", exact_overlap(a, b, T, SHARES[0], quick=True, in_both=probe.in_both)
+    quick = exact_overlap(a, b, T, SHARES[0], quick=True, in_both=probe.in_both)
+    yield "exact", quick
     for chord in chords[1:]:
         yield "meshes", meshes_distance(a, b, T, chord, enough)
-    for share in SHARES:
+    for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
         yield "exact", exact_overlap(a, b, T, share, in_both=probe.in_both)
+    measured = max(a.chords[-1], b.chords[-1]) if chords else np.inf
     for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
-        yield "meshes", meshes_distance(a, b, T, chord, enough, thorough=True)
+        if chord < measured:
+            yield "meshes", meshes_distance(a, b, T, chord, enough, thorough=True)
 
 
 def _is_round(model: Model) -> bool:

@@ -79,8 +79,10 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     chord = 0.0
     for k, face in enumerate(explore(shape, "FACE")):
         points, quads = _samples(face, k)
-        chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max(initial=0.0)))
-        middle = points[quads[len(quads) // 2, 3]] if len(quads) else np.zeros(3)
+        if not len(quads):
+            continue
+        chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max()))
+        middle = points[quads[len(quads) // 2, 3]]
         away = [_from_surface(solid, middle) for solid in solids]
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
