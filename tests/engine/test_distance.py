@@ -183,3 +183,14 @@ def test_what_is_known_from_one_side_alone_is_said_as_an_inequality(lower, upper
     assert repr(found) == f"Distance({said}, 'boxes')"
     assert found.uncertainty == (0.25 if lower == 0.25 else math.inf)
     assert f"distance={found!r}" in repr(PairResult("a", "b", Verdict.CLEARANCE, found))
+
+
+def test_two_answers_together_have_the_points_of_the_shorter_and_the_normal_that_proves_the_gap():
+    x, y = np.eye(3)[:2]
+    loose = Distance(-1.0, 0.0, x, x, normal=x)  # its points touch
+    proven = Distance(-0.5, 0.25, y, y, normal=y)  # along its normal they overlap by half a millimetre at most
+    for met in (loose.meet(proven), proven.meet(loose)):
+        assert (met.lower, met.upper) == (-0.5, 0.0)
+        assert met.point_a is x
+        assert met.normal is y
+    assert loose.meet(replace(proven, normal=None)).normal is x
