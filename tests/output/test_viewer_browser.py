@@ -6,6 +6,7 @@ the cut faces, found with the browser's own camera, against the part's colour.
 
 import io
 import itertools
+import json
 import math
 import os
 import re
@@ -403,14 +404,14 @@ def test_served_page_follows_the_run_and_measures_between_the_stops(browser, run
             before, stop = viewer.story["stops"][k - 1 : k + 1]
             seek(page, 0.4 * before["leave"] + 0.6 * stop["arrive"])
             seconds = page.evaluate("viewer.animator.time")  # to a thousandth
-            wait_for(page, "document.querySelectorAll('#now tr').length === 21")
-            page.wait_for_timeout(500)  # what was measured while it played comes first
+            rows = viewer.answer({"time": str(seconds)})["rows"]
+            gaps = json.dumps({f"{row['a']}\u2013{row['b']}": row["gap"] for row in rows})
             cells = "[...document.querySelectorAll('#now tr')].map((tr) => [1, 2].map((k) => tr.cells[k].textContent))"
-            shown = dict(page.evaluate(cells))
+            same = "(shown, gaps) => shown.length === 21 && shown.every(([pair, gap]) => gaps[pair] === gap)"
+            wait_for(page, f"({same})({cells}, {gaps})")  # what was measured while it played comes first
             poses = {name: pose_in_browser(page, ["parts", name]) for name in run.poses}  # three.js: single precision
             truth = measure(run.scene.moved({name: nearest_rigid(T[None])[0] for name, T in poses.items()}))
-            for row in viewer.answer({"time": str(seconds)})["rows"]:
-                assert shown[f"{row['a']}\u2013{row['b']}"] == row["gap"]
+            for row in rows:
                 assert row["distance_mm"] == pytest.approx(truth[row["a"], row["b"]].upper, abs=1e-3)
         go_to(page, len(run.path) - 1)
         assert_drawn(page, run.poses)
