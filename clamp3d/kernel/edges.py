@@ -235,7 +235,7 @@ def bound_by_mixture(stretch: Stretch, course: Course, f: float) -> float:
     elif (w1 > 0.0) != (e1 > 0.0):
         u, v = e1 / (e1 - w1), w1 / (w1 - e1)
     else:
-        u, v = (1.0, 0.0) if s.g > s.e else (0.0, 1.0)
+        return bound
     drop = fall(u * w1 + v * e1, u * w2 + v * e2, u * s.third + v * s.tilt, s.half)
     return max(bound, u * s.g + v * s.e - drop)
 
