@@ -16,6 +16,20 @@ def on_arc(groove, rod, ez, limit, eps):
     return edges.on_arc(groove, rod, ez, limit, eps)
 
 
+@numba.njit(error_model="numpy")
+def bounds_about(groove, rod, ez, angle, half):
+    arc = edges.end_arc_of(groove, rod, ez)
+    course = edges.course_at(arc, rod, angle)
+    stretch = edges.stretch_about(arc, rod, course, half)
+    f = edges.cylinder_distance(rod, course.w, course.t)
+    mixture = edges.bound_by_mixture(stretch, course, f) if stretch.bend < math.inf else -math.inf
+    rates = np.empty((101, 4))
+    for i in range(101):
+        at = edges.course_at(arc, rod, angle + half * (0.02 * i - 1.0))
+        rates[i] = at.w1, at.w2, at.t1, at.t2
+    return mixture, stretch, rates
+
+
 def _beside(P, r, l, c, d):  # noqa: E741
     """Signed distance of points (n, 3) from a cylinder about c along d."""
     m = P - c
@@ -63,3 +77,28 @@ def test_an_end_arc_has_no_nearer_point():
         # What is not nearer than what is known is not looked for.
         assert on_arc(groove, rod, ez, true - 1e-3, 1e-13).f == math.inf
         assert on_arc(groove, rod, ez, true + 1e-3, 1e-13).f == pytest.approx(best.f, abs=1e-12)
+
+
+def test_on_a_stretch_of_an_arc_nothing_is_outside_its_bounds():
+    rng = np.random.default_rng(2)
+    tight = 0
+    for r, l, c, d in _cylinders(rng, 2000):  # noqa: E741
+        angle, half = rng.uniform(-3.0, 3.0), 10.0 ** rng.uniform(-3.0, 0.0)
+        rod, groove = _rod(r, l, c, d), Groove(12.0, 3.1, 0.0, 0.0, 0.0)
+        mixture, stretch, rates = bounds_about(groove, rod, 5.0, angle, half)
+        q = angle + np.linspace(-half, half, 301)
+        m = np.column_stack([12.0 * np.sin(q), -12.0 * np.cos(q), 0.0 * q + 5.0]) - c
+        t = m @ d
+        g, e = np.linalg.norm(m - t[:, None] * d, axis=1) - r, np.abs(t) - l
+        f = np.where(np.maximum(g, e) > 0.0, np.hypot(np.maximum(g, 0.0), np.maximum(e, 0.0)), np.maximum(g, e))
+        assert mixture <= f.min() + 1e-12
+        assert stretch.g_low - 1e-12 <= g.min() <= g.max() <= stretch.g_high + 1e-12
+        assert stretch.e_low - 1e-12 <= e.min() <= e.max() <= stretch.e_high + 1e-12
+        third = np.abs(np.diff(rates[:, 1])).max() / (0.02 * half)
+        w1, w2, t1, t2 = np.abs(rates).max(axis=0) - 1e-9
+        assert w1 <= stretch.by
+        assert w2 <= stretch.bend
+        assert third <= stretch.third * 1.001 + 1e-6
+        assert max(t1, t2) <= stretch.tilt
+        tight += mixture > f.min() - 0.02 * half
+    assert tight > 500  # a bound that says nothing would hold too
