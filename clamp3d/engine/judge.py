@@ -75,12 +75,14 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     both_exact = inner.exact is not None and outer.exact is not None
     for level in (0,) if both_exact else (0, -1):  # coarse meshes mostly tell that it does not
         small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
-        if large is None:
-            return False
+        if large is None:  # its walls are thinner than the chord error
+            continue
         # Meshes around and inside of drawn solids are off by their chords.
         slack = small.error + large.error + sum(m.chords[level] for m in (inner, outer) if m.bracketed)
         if not within(small, large, T, contact + slack):
             return False
+    if large is None:
+        return False
     if inner.exact is None or outer.exact is None:
         return True
     # Meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.

@@ -16,7 +16,7 @@ from clamp3d.clamp.assemble import STEP, TILT_STEP
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
-from clamp3d.clamp.section import SIZE, D, Section
+from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.stepped import solve_bisection, solve_stepped
 
 # Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
@@ -53,6 +53,7 @@ def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
         )
         assert -1e-9 <= found.q[D] - least <= resolution
         assert found.gaps.value.min() >= -1e-9
+        assert abs(found.q[S]) <= section.lever * clamp.tilt_stop
         assert [made for made, _ in tried] == sorted({made for made, _ in tried})
         assert found.motion_steps >= tried[-1][0]
         assert tried[-1][1] == pytest.approx(found.q[D], abs=1e-12)

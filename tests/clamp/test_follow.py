@@ -100,6 +100,8 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     with pytest.raises(SequenceError, match=f"{step}: .* meets .* after") as refused:
         assemble("reference", sequence=sequence)
     first = refused.value.blocks[0]
+    left = [block.way - block.travel for block in refused.value.blocks]
+    assert left == sorted(left)
     assert (first.a, first.b) == pair
     assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
     assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)

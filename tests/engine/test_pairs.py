@@ -65,6 +65,13 @@ def test_verdicts(b, T, verdict):
     measured_alike(scene, result)
 
 
+@pytest.mark.parametrize(("hole", "size", "verdict"), [(0.65, 0.01, "contained"), (0.707, 0.33, "clash")])
+def test_a_part_in_a_corner_that_is_thinner_than_the_meshes(hole, size, verdict):
+    drilled = shapes.box((1, 1, 10), holes=[shapes.Hole(hole)])  # of 0.707 the finest mesh inside is empty too
+    scene = Scene(contact=1e-4).add("a", drilled).add("b", shapes.box((size, size, size)), translation(0.49, 0.49, 0))
+    assert check(scene).verdict("a", "b").value == verdict
+
+
 def test_thresholds():
     t = Thresholds(contact=0.01, clearance=1.0)
     cases = {-0.02: "clash", -0.01: "contact", 0.01: "contact", 0.02: "clearance", 1.0: "clear", 2.0: "clear"}
