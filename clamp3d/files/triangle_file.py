@@ -1,6 +1,6 @@
 """STL, OBJ, PLY and OFF files as one body, by trimesh, whose loaders take what is left of a file that was cut off.
 
-So the triangles that the file announces are counted here. This runs in the process for foreign files.
+So the faces that the file announces are counted here. This runs in the process for foreign files.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ import trimesh
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.geometry.mesh import Array, IntArray, make_mesh
+from clamp3d.geometry.mesh import Array, IntArray, edges_of, make_mesh
 from clamp3d.geometry.shapes import MeshShape
+
+_FOLDED = 1e-6
+"""1 less the cosine of the angle (0.08 deg) to which two faces that share an edge are one on the other."""
 
 
 def read_triangles(path: Path, unit: str | None) -> Reading:
@@ -46,9 +49,30 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
     if not read:
         raise InputError("no triangles in the file")
     if read < announced:
-        raise InputError(f"the file is damaged: it announces {announced} triangles or faces, {read} were read")
-    vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
-    return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+        raise InputError(f"the file is damaged: it announces {announced} faces, {read} were read")
+    V, F = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
+    vertices, faces = np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+    if read > announced:  # some faces have more than three corners
+        _require_no_folds(vertices, faces)
+    return vertices, faces
+
+
+def _require_no_folds(vertices: Array, faces: IntArray) -> None:
+    """Raise InputError if a face folds back onto its neighbour.
+
+    trimesh cuts faces with many corners into fans from the first one: of a face with a notch some lie beside it.
+    """
+    _, pairs, _ = edges_of(faces, 2)
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    with np.errstate(all="ignore"):
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        folds = (normal[pairs[:, 0]] * normal[pairs[:, 1]]).sum(axis=1) < -1.0 + _FOLDED
+    if folds.any():
+        raise InputError(
+            "a face folds back onto its neighbour, as faces with notches do when they are cut into triangles: "
+            "export it as triangles"
+        )
 
 
 def _announced_stl(raw: bytes) -> int:
@@ -73,19 +97,40 @@ def _announced_stl(raw: bytes) -> int:
 
 
 def _announced_obj(raw: bytes) -> int:
-    # A line with too few corners counts too: trimesh leaves it out.
-    return sum(max(1, len(line.split()) - 3) for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw))
+    corners = [len(line.split()) - 1 for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw)]
+    if min(corners, default=3) < 3:  # trimesh leaves it out
+        raise InputError(f"the file is damaged: a face has {min(corners)} corners")
+    return len(corners)
 
 
 def _announced_ply(raw: bytes) -> int:
-    number = re.search(rb"element\s+face\s+(\d+)", raw[:100_000])
-    return int(number[1]) if number else 0
+    header, _, data = raw.partition(b"end_header")
+    counts = {name: int(number) for name, number in re.findall(rb"element\s+(\w+)\s+(\d+)", header[:100_000])}
+    if b"ascii" in header[:100]:
+        _lines(data, sum(counts.values()))
+    return counts.get(b"face", 0)
 
 
 def _announced_off(raw: bytes) -> int:
-    number = re.search(rb"^\s*\w*OFF\s*(?:#[^\n]*\n\s*)*\d+\s+(\d+)", raw[:100_000])
-    return int(number[1]) if number else 0
+    header = re.search(rb"^\s*(\w*)OFF\s*(?:#[^\n]*\n\s*)*(\d+)\s+(\d+)[^\n]*\n", raw[:100_000])
+    if header is None:
+        return 0
+    if b"4" in header[1] or b"n" in header[1]:
+        raise InputError(f"points of {header[1].decode()}OFF files have more than three coordinates: only OFF is read")
+    vertices, faces = int(header[2]), int(header[3])
+    lines = _lines(raw[header.end() :], vertices + faces)
+    if any(re.match(rb"\s*([5-9]|\d\d)", line) for line in lines[vertices:]):
+        raise InputError("a face has more than four corners: export it as triangles")
+    return faces
+
+
+def _lines(data: bytes, count: int) -> list[bytes]:
+    """The first ``count`` lines that are neither empty nor a comment. Raises InputError if there are fewer."""
+    lines = re.findall(rb"(?m)^[ \t]*[^\s#][^\r\n]*", data)[:count]
+    if len(lines) < count:
+        raise InputError(f"the file is cut off: {count} lines of vertices and faces are announced, {len(lines)} follow")
+    return lines
 
 
 _ANNOUNCED = {"stl": _announced_stl, "obj": _announced_obj, "ply": _announced_ply, "off": _announced_off}
-"""How many triangles at least a file of each format says that it has."""
+"""How many faces a file of each format says that it has."""

@@ -27,6 +27,11 @@ PLY = (
     b"property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 )
 
+CORNERS = b"0 0 0\n2 2 0\n4 0 0\n2 4 0\n"  # of one face: the second is a notch
+OFF = b"OFF\n4 1 0\n" + CORNERS
+NOTCHED_PLY = PLY[: PLY.index(b"0 0 0")].replace(b"vertex 3", b"vertex 4").replace(b"face 2", b"face 1") + CORNERS
+NOTCHED_OBJ = b"".join(b"v " + line + b"\n" for line in CORNERS.splitlines()) + b"f 1 2 3 4\n"
+
 
 def refused(path, message, **options):
     with pytest.raises(InputError, match=message) as caught:
@@ -59,10 +64,15 @@ def with_corner(bits):
         ("a.stl", TEXT.replace(b"0.05", b"nan", 1), "not finite"),
         ("a.stl", TEXT.replace(b"0.05", b"zero", 1), "not a readable STL file"),
         ("a.stl", TEXT.replace(b"endloop", b"vertex 0 0 0\nendloop", 1), "cut off"),
-        ("a.ply", PLY, "not a readable PLY file|it announces 2 triangles"),
-        ("a.off", b"OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "not a readable OFF file|it announces 2 triangles"),
+        ("a.ply", PLY, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
+        ("a.ply", NOTCHED_PLY + b"4 0 1 2 3\n", "a face folds back onto its neighbour"),
+        ("a.obj", NOTCHED_OBJ, "a face folds back onto its neighbour"),
+        ("a.off", OFF + b"4 0 1 2 3\n", "a face folds back onto its neighbour"),
+        ("a.off", OFF, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
+        ("a.off", OFF + b"5 0 1 2 3 0\n", "a face has more than four corners"),
+        ("a.off", b"4" + OFF, "4OFF"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "it announces 2 triangles or faces, 1 were read"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "damaged: a face has 1 corners"),
         ("a.3mf", b"not a zip", "not a readable 3MF file"),
     ],
 )
