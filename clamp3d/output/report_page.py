@@ -19,7 +19,7 @@ from clamp3d.output.pages import now, render
 from clamp3d.output.palette import DIMENSION, INK, VERDICT_COLOURS, part_colours
 from clamp3d.output.report import LISTED, SEVERITIES, Finding, PairRow, Report
 from clamp3d.output.tables import csv_table
-from clamp3d.output.wording import distance_text, meaning, titles
+from clamp3d.output.wording import distance_text, first_text, meaning, titles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,6 +129,7 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda step
         made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=_versions(),
         gap=distance_text,
+        first_text=first_text,
         bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "unknown",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
         degrees=math.degrees,

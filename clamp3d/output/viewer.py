@@ -31,7 +31,7 @@ from clamp3d.output.scene_report import work_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import Command, Pieces, SceneDrawing
 from clamp3d.output.viewer_story import LISTED, ClampStory, Stop, Story, findings_of, findings_of_clamp
-from clamp3d.output.wording import by_group, counted, distance_text, headline, meaning, severity, titles
+from clamp3d.output.wording import by_group, counted, distance_text, first_text, headline, meaning, severity, titles
 from clamp3d.scenefile.check import opened
 
 _CURVES = 4
@@ -223,6 +223,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             "groups": [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])],
             "version": __version__,
             "gap": distance_text,
+            "first_text": first_text,
             "counted": counted,
             "degrees": math.degrees,
         }

@@ -200,17 +200,19 @@ def test_the_saved_curve_of_a_finding_holds_its_distance():
     """At every moment the bounds hold the distance calculated by hand, on the time line in the right place."""
     cube = shapes.box((10, 10, 10))
     scene = Scene().add("still", cube).add("slider", cube, translation(30, 0, 0))
-    with view(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider")), serve=False) as viewer:
-        viewer.html()
+    with view(scene.with_motion(Motion.translate((-27.0, 0.0, 0.0), parts="slider")), serve=False) as viewer:
+        page = viewer.html()
         (finding,), (rest, first, end) = viewer.story["findings"], viewer.story["stops"]
         (bounds,) = viewer.story["curves"].values()
     seconds = np.array(finding["moments"])
-    meeting = 0.8 - 0.01 / 25.0  # contact is a gap of 0.01 mm
+    meeting = (20.0 - 0.01) / 27.0  # contact is a gap of 0.01 mm
+    assert page.count("0.7403") >= 2  # in the finding and in the table: never late
+    assert "0.7404" not in page
     assert seconds[[0, -1]] == pytest.approx([rest["leave"], end["arrive"]])
     assert 20 <= len(seconds) <= 30
     t = np.interp(seconds, [rest["leave"], first["arrive"], first["leave"], end["arrive"]], [0, meeting, meeting, 1])
     assert first["t"] == pytest.approx(meeting, abs=1e-5)
-    np.testing.assert_allclose(bounds, np.column_stack([20.0 - 25.0 * t] * 2), atol=1e-4)
+    np.testing.assert_allclose(bounds, np.column_stack([20.0 - 27.0 * t] * 2), atol=1e-4)
 
 
 def test_a_clean_clamp_has_notes_and_no_findings(recorded):
