@@ -112,7 +112,7 @@ class Check(Source, Quiet):
         verdicts = {group.verdict for group in comparison.open(groups)}
         finish(assembled is not None and not assembled.passed, verdicts=verdicts)
         if not result.work.pairs:
-            raise InputError("there is no pair of parts to judge")
+            raise InputError("there are no two parts to check")
 
     def _scene(self) -> tuple[Scene, Assembly | None]:
         """The scene to check, and the clamp that it is of."""

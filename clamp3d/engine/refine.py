@@ -1,6 +1,6 @@
 """Refine a pair until it is known well enough: boxes, closed forms, meshes, Open CASCADE, each only if needed.
 
-This is the one place where pairs of shapes are handed to the methods that measure them.
+Here pairs of shapes are handed to the methods that measure gaps and interference; depths are in `depth.py`.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def read_in_process(path: Path, option: Any = None) -> Reading:
         problem = f"the reader ended with {error.ending}: {reason}"
     except InputError as error:
         problem = str(error)
-    raise InputError(f"{short(path)}: {problem}")
+    raise InputError(f"{short(path)}: {problem.removeprefix(f'{path.name}: ')}")
 
 
 def may_read(file: Path, folder: Path) -> bool:

@@ -159,6 +159,7 @@ def work_text(work: Work) -> list[str]:
     queries = ", ".join(f"{count} {level}" for level, count in work.queries.items() if count)
     return [
         f"decided: {decided or 'nothing'}",
-        f"built: {work.meshes} meshes ({work.triangles} triangles), {work.hulls} hulls, {work.fits} fits "
-        f"for {work.shapes} shapes; queries: {queries or 'none'}; {sum(work.seconds.values()):.2f} s",
+        f"built for that: {counted(work.meshes, 'mesh', 'meshes')} ({counted(work.triangles, 'triangle')}), "
+        f"{counted(work.hulls, 'hull')}, {counted(work.fits, 'fit')} for {counted(work.shapes, 'shape')}; "
+        f"queries: {queries or 'none'}; {sum(work.seconds.values()):.2f} s",
     ]

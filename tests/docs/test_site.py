@@ -54,6 +54,12 @@ def test_the_public_names_are_few_and_documented():
         assert (getattr(clamp3d, name).__doc__ or "").strip(), name
 
 
+def test_every_public_shape_is_in_the_reference():
+    page = (ROOT / "docs" / "api" / "shapes.md").read_text(encoding="utf-8")
+    for name in clamp3d.shapes.__all__:
+        assert re.search(rf"[\[ .]{name}\b", page), name
+
+
 def test_one_version():
     for name in ("pyproject.toml", "CITATION.cff"):
         assert re.search(rf'^version\W+{re.escape(clamp3d.__version__)}"?$', (ROOT / name).read_text(), re.MULTILINE), (
