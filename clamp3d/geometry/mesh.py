@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d import checks
 from clamp3d.errors import InputError
-from clamp3d.geometry.shells import inside_out, joined, volume
+from clamp3d.geometry.shells import inside_out, joined, shells, volume, winding_numbers
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -105,6 +105,8 @@ def make_mesh(
         notes.append(fault)
     if watertight:
         F = _outward(V, F, name, notes)
+        if fault or len(shells(F, len(V))) > 1:
+            V, F = _united(V, F, notes)
     mesh = Mesh(name, V, F, watertight, rounding, tuple(notes))
     slivers = mesh.slivers
     if slivers.all():
@@ -167,6 +169,34 @@ def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
     if not volume(V, F) > 0.0:
         raise InputError(f"{name}: the surface encloses no volume")
     return F
+
+
+def _united(V: Array, F: IntArray, notes: list[str]) -> tuple[Array, IntArray]:
+    """A closed mesh without the walls between bodies that overlap or touch, which are no surface of what they make."""
+    import manifold3d
+
+    def as_manifold(vertices: Array, faces: IntArray) -> Any:
+        vertices = np.ascontiguousarray(vertices)
+        return manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
+
+    def arrays(manifold: Any) -> tuple[Array, IntArray]:
+        mesh = manifold.to_mesh64()
+        return np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
+
+    surfaces = sorted(as_manifold(V, F).decompose(), key=lambda surface: float(surface.volume()))
+    solids = [surface for surface in surfaces if surface.volume() > 0.0]
+    if len(solids) < 2:
+        return V, F
+    bodies = [*solids]
+    for corners, triangles in map(arrays, surfaces[: -len(solids)]):  # cavities, each of the smallest solid round it
+        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays(solid), corners[:1])[0] > 0.5)
+        k = next(around, -1)
+        bodies[k] -= as_manifold(corners, triangles[:, ::-1])
+    whole = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
+    if whole.num_tri() == len(F) and np.isclose(whole.volume(), volume(V, F), rtol=1e-9):
+        return V, F
+    notes.append(f"{len(solids)} bodies in the mesh, some of which overlap or touch: taken as one")
+    return arrays(whole)
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Mesh:
