@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -127,11 +127,34 @@ def command(name: str) -> Callable[[type[Any]], click.Command]:
         def call(**values: Any) -> None:
             instance = kind()
             vars(instance).update(values)
+            _keep_apart(parameters, values)
             instance.run()
 
         return click.Command(name, params=[*parameters.values()], callback=call, help=inspect.getdoc(kind))
 
     return decorate
+
+
+def _keep_apart(parameters: Mapping[str, click.Parameter], values: Mapping[str, Any]) -> None:
+    """Refuse that a file is written over another one, or over what the command reads."""
+    from clamp3d.output.files import STDOUT, check_writable, keep
+
+    arguments = [values[name] for name, p in parameters.items() if isinstance(p, click.Argument) and p.nargs == 1]
+    read = [Path(value) for value in arguments if value and os.path.exists(value)]
+    keep(file for path in read for file in ([path] if path.is_file() else _files_with_parts(path)))
+    written: dict[str, str] = {}
+    for name, parameter in parameters.items():
+        if isinstance(parameter.type, Output) and values[name] not in (None, STDOUT):
+            check_writable(values[name])
+            other = written.setdefault(os.path.realpath(values[name]), parameter.opts[0])
+            if other != parameter.opts[0]:
+                raise click.UsageError(f"{other} and {parameter.opts[0]} are one file: {values[name]}")
+
+
+def _files_with_parts(folder: Path) -> list[Path]:
+    from clamp3d.files.formats import FORMATS
+
+    return [file for file in folder.iterdir() if file.suffix.lower() in FORMATS]
 
 
 def _wires(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:

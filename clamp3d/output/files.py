@@ -8,7 +8,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,19 @@ from clamp3d.errors import InputError
 
 STDOUT = Path("-")
 """As the path of a file to write: standard output."""
+_KEPT: set[Path] = set()
+"""Files that are not written over: what the command reads."""
+
+
+def keep(files: Iterable[Path]) -> None:
+    """Refuse from now on to write over these files, and over no others."""
+    _KEPT.clear()
+    _KEPT.update(Path(os.path.realpath(file)) for file in files)
+
+
+def _require_not_kept(path: Path) -> None:
+    if Path(os.path.realpath(path)) in _KEPT:
+        raise InputError(f"cannot write {short(path)}: it is the input")
 
 
 @contextmanager
@@ -28,6 +41,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to,
     or the disk is full.
     """
+    _require_not_kept(path)
     target = Path(os.path.realpath(path))
     special = path == STDOUT or (target.exists() and not target.is_file() and not target.is_dir())
     with ExitStack() as stack:
@@ -61,6 +75,7 @@ def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to be called before long work."""
     if path.is_dir():
         raise InputError(f"cannot write {short(path)}: it is a folder")
+    _require_not_kept(path)
     if path != STDOUT and (not path.exists() or path.is_file()):
         _probe(Path(os.path.realpath(path)).parent, f"cannot write {short(path)}")
 

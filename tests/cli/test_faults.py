@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+import trimesh
 
 BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
 COMMAND = [sys.executable, "-m", "clamp3d"]
@@ -138,3 +139,23 @@ def _children(pid):
 def _alive(pid):
     found = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True, check=False)
     return found.stdout.strip() not in ("", "Z", "Zs")
+
+
+def test_no_file_is_written_over_what_is_read_or_over_another(tmp_path, monkeypatch, main):
+    monkeypatch.chdir(tmp_path)
+    for name, x in (("a", 0.0), ("b", 5.0)):
+        trimesh.creation.box((1.0, 2.0, 3.0)).apply_translation((x, 0.0, 0.0)).export(f"{name}.stl")
+    (tmp_path / "scene.toml").write_text(BOX.format(name="a", x=0.0) + BOX.format(name="b", x=20.0))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for arguments, problem in (
+        (("check", "scene.toml", "--json", "./scene.toml"), "cannot write scene.toml: it is the input"),
+        (("check", "scene.toml", "--csv", "x", "--json", "./x"), "--json and --csv are one file"),
+        (("view", "scene.toml", "--html", "scene.toml"), "it is the input"),
+        (("export", ".", "--format", "stl", "--output", "."), "it is the input"),
+        (("export", "a.stl", "--output", "a.stl"), "it is the input"),
+    ):
+        code, _, error = main(*arguments)
+        assert (code, problem in error) == (2, True), error
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    for _ in range(2):  # results may be written again, also beside the input
+        assert main("check", ".", "--json", "result.json", "--quiet")[0] == 0
