@@ -108,8 +108,14 @@ def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, sharp: bool =
     if sharp and distance.upper - distance.lower > 1e-9 and abs(distance.upper) < _TOUCHING:
         from clamp3d.engine.convex_depth import convex_depth  # which needs the pieces of this module
 
-        distance = distance.meet(Distance(convex_depth(a, Ta, b, Tb).lower))
+        proof = convex_depth(a, Ta, b, Tb)
+        distance = distance.meet(replace(distance, lower=proof.lower, normal=proof.normal))
     return replace(distance, unique=_unique(a, Ta, b, Tb, distance))
+
+
+def nearest_points(a: Convex, Ta: Array, b: Convex, Tb: Array) -> tuple[Array, Array] | None:
+    """FCL's nearest points (3,) of two pieces; None where they touch or overlap."""
+    return _nearest(_enlarged(a, Ta), _enlarged(b, Tb))
 
 
 def _nearest(a: Any, b: Any) -> tuple[Array, Array] | None:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.convex import Convex, face_normals
+from clamp3d.engine.convex import Convex, face_normals, nearest_points
 from clamp3d.engine.hull import hull
 from clamp3d.geometry.pose import Array, to_target
 
@@ -59,8 +59,17 @@ def convex_depth(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Distance:
     scale = float(np.abs(P).max() + np.abs(Ta[:3, 3]).max() + np.abs(Tb[:3, 3]).max())
     lower, upper, n = expand(difference, N, P, _WIDTH * scale)
     rounding = 16.0 * _EPS * scale
-    p, q = sa(n[None])[0], sb(-n[None])[0]
-    return Distance(-upper - rounding, -lower + rounding, p, q, n, None, "depth", "convex")
+    p = _last_to_part(a, Ta, b, Tb, n, upper, scale)
+    p = sa(n[None])[0] if p is None else p
+    return Distance(-upper - rounding, -lower + rounding, p, p - upper * n, n, None, "depth", "convex")
+
+
+def _last_to_part(a: Convex, Ta: Array, b: Convex, Tb: Array, n: Array, depth: float, size: float) -> Array | None:
+    """The point (3,) of ``a`` that is nearest to ``b`` just after that has moved out by ``depth`` along ``n`` (3,)."""
+    T = Tb.copy()
+    T[:3, 3] += (depth + 1e-4 * size) * n
+    nearest = nearest_points(a, Ta, b, T)
+    return None if nearest is None else nearest[0]
 
 
 def expand(difference: Supports, N: Array, P: Array, tolerance: float) -> tuple[float, float, Array]:

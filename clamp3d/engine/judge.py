@@ -31,7 +31,8 @@ def judge(
     """
     if is_duplicate(a, b, T, thresholds.contact):
         verdict = Verdict.ALLOWED if allowance == np.inf else Verdict.DUPLICATE
-        return verdict, replace(start, lower=-np.inf, upper=-0.0, level="boxes", method="equal shapes")
+        # Each point of one lies so near to the same point of the other.
+        return verdict, replace(start, lower=-np.inf, upper=_moved_by(a, T), level="boxes", method="equal shapes")
 
     def certain(distance: Distance) -> bool:
         return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN
@@ -53,8 +54,13 @@ def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
     """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
     if a.shape is not b.shape and a.shape != b.shape:
         return False
-    corners = box_corners(a.bounds)
-    return bool(np.linalg.norm(to_target(T, corners) - corners, axis=1).max() <= contact)
+    return _moved_by(a, T) <= contact
+
+
+def _moved_by(model: Model, T: Array) -> float:
+    """How far (mm) ``T`` (4, 4) moves the points of a part at most."""
+    corners = box_corners(model.bounds)
+    return float(np.linalg.norm(to_target(T, corners) - corners, axis=1).max())
 
 
 def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:

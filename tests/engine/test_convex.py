@@ -102,6 +102,33 @@ def test_the_signed_distance_of_two_pieces(seed):
         assert least <= found.upper + 1e-8
 
 
+def test_points_of_an_overlap_lie_on_both_surfaces_and_part_last():
+    rng = np.random.default_rng(3)
+    deep = 0
+    for k in range(60):
+        a, b = (
+            CUBE if rng.random() < 0.5 else Rod(*rng.uniform(1.0, 6.0, 2), TURNED @ rotation(rng.normal(size=3), 1.0))
+            for _ in "ab"
+        )
+        T = translation(*rng.uniform(-3.0, 3.0, 3)) @ (rotation(rng.normal(size=3), 2.0) if k % 3 else HERE)
+        d = convex_depth(a, HERE, b, T)
+        if d.upper > -1e-3:
+            continue
+        deep += 1
+        on_b = to_target(inverse(T), d.point_b)
+        assert a.depth(d.point_a[None])[0] == pytest.approx(0.0, abs=1e-7)
+        assert b.depth(on_b[None])[0] == pytest.approx(0.0, abs=1e-7)
+        assert d.point_b == pytest.approx(d.point_a + d.value * d.normal, abs=1e-7)
+    assert deep > 20
+
+
+def test_cylinders_that_touch_are_apart_along_the_line_between_their_axes():
+    a, b = shapes.cylinder(3.5791532715129657, 1.2), shapes.cylinder(0.07041993482427572, 0.5)
+    d = distance(a, b, translation(3.6495732063755963, 0.0, 0.0) @ rotation((0.0, 1.0, -1.4), 2e-10))
+    assert d.method == "convex"
+    assert d.normal == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
+
+
 def test_what_is_left_before_a_plane():
     rng = np.random.default_rng(1)
     for _ in range(20):
