@@ -106,7 +106,7 @@ def _approach_line(step: str, closing: Closing, log: Log) -> None:
         (settled, "up splint rests on the line"),
     ):
         log.reach(step, label, section.poses(state) | jumper)
-    log.touch(step, [("P1", "P6")], section.poses(settled), float(opened[1] - start[1]))
+    log.touch(step, [("P1", "P6")], section.poses(settled), middle - float(start[1]))
 
 
 def _insert_jumper(step: str, closing: Closing, log: Log) -> None:

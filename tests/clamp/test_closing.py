@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from outlines import Outlines
 from random_clamps import check_clamps, whole_clamp
+from shapely import LineString
 
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.section import EDGES, D, Section, U
+from clamp3d.clamp.section import EDGES, D, S, Section, U, W
 
 
 def test_an_optimiser_and_a_grid_agree():
@@ -30,6 +31,24 @@ def test_the_open_clamp_overlaps_nothing_at_any_tilt():
             gaps = section.gaps(section.open_state(section.open_distance(), tilt))
             apart = [gap for gap, pair in zip(gaps.value, gaps.pair, strict=True) if pair != ("P2", "P3")]
             assert min(apart) >= -1e-9, k
+
+
+def test_inner_faces_are_as_far_apart_as_their_lines():
+    """Of splints of any widths, tilts and shifts; shapely measures the two lines."""
+    overhangs = set()
+    for k in range(60):
+        rng = np.random.default_rng([12, k])
+        section = Section(whole_clamp(rng), Cas())
+        up, down = section.clamp.up_splint, section.clamp.down_splint
+        q = section.open_state(section.open_distance(), rng.uniform(-0.2, 0.2))
+        q[W] += rng.uniform(-10.0, 10.0)
+        for _ in range(20):  # down until they all but touch: further apart the gap is less than the distance
+            corners = [section.down_splint(q).point(side * section.lever, down.face_depth) for side in (-1.0, 1.0)]
+            away = LineString([(0.0, up.thickness), (up.width, up.thickness)]).distance(LineString(corners))
+            q[D] -= away - 1e-3
+        assert section.face_gap(q) == pytest.approx(1e-3, abs=1e-9)
+        overhangs |= {(corners[0][0] < 0.0, corners[1][0] > up.width, q[S] > 0.0)}
+    assert len(overhangs) == 8
 
 
 @pytest.mark.parametrize("joints", [Joints(), Joints(hole=True, saddle=True, washer=True)])

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_clamps import whole_clamp
 
 from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import Wire
@@ -86,8 +87,11 @@ def test_each_rule_holds_up_to_its_limit_and_no_further(path, limit, side, messa
             return str(error)
         return ""
 
-    assert message in complaint(limit * (1.0 - 1e-6 * side))
+    wrong = complaint(limit * (1.0 - 1e-6 * side))
+    assert message in wrong
     assert message not in complaint(limit * (1.0 + 1e-6 * side))
+    if "centre_depth" not in path and path != "down_splint.width":  # whose messages have other numbers
+        assert f"{limit:.4g}"[:5] in wrong
 
 
 def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
@@ -107,3 +111,32 @@ def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
     made(40.0, 60.0 - 23.8012 + 1e-6)
     with pytest.raises(InputError, match="does not reach its face"):
         made(40.0, 60.0 - 23.8012 - 1e-6)
+
+
+def test_the_tilt_stops_where_edge_and_slot_touch_and_the_edges_lift_the_splint_no_further_than_they_must():
+    """Points of the tilted splint, turned by hand, against the saddle's edges and the upright shank."""
+    stopped = set()
+    for k in range(40):
+        clamp = whole_clamp(np.random.default_rng([5, k]))
+        down, saddle = clamp.down_splint, clamp.saddle
+        # The saddle's edges seen from the back's centre, when that rests in the apex.
+        edges = np.array([-0.5, 0.5]) * saddle.width
+        below = math.sqrt(saddle.radius**2 - 0.25 * saddle.width**2) - (saddle.radius - down.back_radius)
+        bottom = math.sqrt(max(down.back_radius**2 - 0.25 * down.slot_width**2, down.underside_depth**2))
+        u, v = np.array([(side * 0.5 * down.slot_width, v) for side in (-1.0, 1.0) for v in (down.face_depth, bottom)]).T
+
+        def lift(t):
+            return float((down.underside_depth - edges * math.sin(t)).max() / math.cos(t) - below)
+
+        def room(t):
+            return float((np.sign(u) * (u * math.cos(t) + v * math.sin(t))).min()) - 0.5 * clamp.bolt.diameter
+
+        for name, left in (("the saddle's edge", lambda t: -lift(t)), ("the slot", room)):
+            stop = clamp.tilt_stops[name]
+            assert left(stop) == pytest.approx(0.0, abs=1e-9)
+            assert stop <= 0.0 or left(0.5 * stop) > 0.0
+        assert clamp.tilt_stop == min(clamp.tilt_stops.values()) == clamp.tilt_stops[clamp.tilt_stopped_by]
+        stopped.add(clamp.tilt_stopped_by)
+        tilts = np.linspace(-0.5, 0.5, 9)
+        assert clamp.lifted(tilts) == pytest.approx([max(0.0, lift(t)) for t in tilts], abs=1e-9)
+    assert len(stopped) == 2
