@@ -143,7 +143,7 @@ def _relation(
     clamp: Clamp, poses: Poses, pair: Pair, gap: float, surfaces: tuple[tuple[Surface, ...], tuple[Surface, ...]]
 ) -> tuple[ConnectionType, str]:
     """Type of the connection by what touches, and what the paper calls it, or the plainest word where it has none."""
-    if pair == ("P4", "P5") and gap <= TOUCHING and _is_screwed_on(clamp, poses):
+    if pair == ("P4", "P5") and _is_screwed_on(clamp, poses):
         return 1, SCREW_JOINT
     first, second = ({surface.name for surface in own} for own in surfaces)
     groove = next((groove for groove in groove_pairs(clamp).values() if {groove.a, groove.b} == set(pair)), None)

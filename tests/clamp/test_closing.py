@@ -65,6 +65,7 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
     assert min(c.gap for c in run.contacts if (c.a, c.b) != ("P4", "P5")) >= -1e-6
     if not joints.saddle:
         assert list(on_saddle) == [EDGES]
+        assert {c.relation: c.type for c in run.contacts if (c.a, c.b) == ("P2", "P3")} == {"contact": 2}
         assert final.q[U] > 3.0
 
 

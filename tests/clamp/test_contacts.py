@@ -10,9 +10,12 @@ import shapely
 
 from clamp3d import assemble, load_clamp, measure
 from clamp3d.baselines import Chords
+from clamp3d.clamp.contact import measure_contacts, overlap
 from clamp3d.clamp.dimensions import GrooveDimensions
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.surfaces import SURFACES, surfaces_at
+from clamp3d.clamp.surfaces import surfaces_at
+from clamp3d.geometry.pose import SectionPose
+from clamp3d.geometry.profile import Arc
 
 WIRES = [("LJ-630", "LJ-120"), ("LJ-16", "LJ-16"), (46.0, 14.0)]
 
@@ -47,8 +50,6 @@ def test_reference_differs_from_its_matrix_where_the_bolt_has_play():
         ("P2", "P6"): 3, ("P2", "P7"): 3, ("P3", "P4"): 2, ("P4", "P5"): 1,
     }  # fmt: skip
     found = {(c.a, c.b): c for c in assembly.contacts}
-    assert found["P1", "P5"].relation == found["P3", "P4"].relation == "seat"
-    assert found["P4", "P5"].relation == "screw joint"
     # Measured on the exported STEP by Open CASCADE; the slot is 1 mm longer than the bolt.
     assert found["P1", "P2"].gap == pytest.approx(3.729354, abs=1e-6)
     for pair in (("P1", "P4"), ("P2", "P4")):
@@ -125,16 +126,78 @@ def test_a_contact_model_measures_its_own_contacts():
     assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
 
 
-@pytest.mark.parametrize(
-    ("part", "point", "name"),
-    [
-        ("P1", (10.0, 30.0, -10.0), "end face"),
-        ("P1", (0.0, 0.0, -10.0), "flat face"),
-        ("P1", (79.5, 0.0, -10.0), "hole"),
-        ("P6", (0.0, 0.0, 16.335), "round face"),
-        ("P5", (0.0, 14.0, 0.0), "flat face"),
-    ],
-)
-def test_surfaces_have_their_names(part, point, name):
-    names = [surface.name for surface in surfaces_at(parts(load_clamp())[part], np.eye(4), np.array(point))]
-    assert min(names, key=SURFACES.index) == name
+def test_moved_parts_are_named_in_the_papers_words():
+    """Bolt and hole as in Table 2, an arc and its wire as in Table 3; what the paper has no word for is plain."""
+    clamp, home = load_clamp(), {name: replace(pose, along=0.5) for name, pose in assemble().poses.items()}
+    up, down, one_side = clamp.up_splint, clamp.down_splint, "two points on one side"
+    face = home["P1"].y + up.thickness
+    level, tilt = face - home["P2"].y - down.face_depth, home["P2"].angle  # where the splints' faces meet untilted
+    lip = home["P1"].x + 68.5 - 46.0349 - math.sqrt(23.8012**2 - (48.7901 - up.thickness) ** 2)
+
+    def slot(side, t):  # the nearest corner of the tilted slot on the bolt
+        corners = (21.0 * math.cos(t) + side * v * math.sin(t) for v in (down.face_depth, down.slot_bottom))
+        return {"x": side * (10.0 - min(corners)), "angle": t - tilt}
+
+    cases = [
+        ("P1-P4", {"x": 0.5}, 0, "none", "hole", 0.5),
+        ("P1-P4", {"x": -1.0, "y": 100.0}, 2, one_side, "hole", 0.0),
+        ("P1-P4", {"x": 1.01}, 2, "overlap", "hole", -0.01),
+        *(("P4-P2", slot(side, 0.0), 2, one_side, "hole", 0.0) for side in (-1, 1)),
+        *(("P4-P2", slot(side, t), 2, "one point", "hole", 0.0) for side in (-1, 1) for t in (-0.05, 0.05)),
+        ("P4-P5", {"x": 1e-7}, 1, "screw joint", "thread", 0.0),
+        ("P4-P5", {"x": 0.1}, 2, "overlap", "hole", -0.1),
+        ("P4-P5", {"along": -0.1}, 2, "overlap", "hole", -0.1),
+        *(("P4-P5", {"y": y}, 0, "none", None, None) for y in (160.0, -90.0)),
+        ("P3-P4", {"x": 0.5 * clamp.saddle.hole_diameter - 10.0, "y": 0.5}, 2, "contact", "hole", 0.0),
+        ("P1-P6", {"x": lip - 0.05, "y": face + 16.335}, 2, "contact", "flat face", 0.0),
+        *(
+            ("P1-P6", {"y": y}, kind, word, "arc", None)
+            for y, kind, word in ((0.5, 0, "inside"), (-0.5, 3, "intersect"))
+        ),
+        ("P2-P3", {"y": 0.5}, 0, "inside", "arc", 0.5),
+        ("P2-P3", {"y": -0.5}, 3, "intersect", "arc", -0.5),
+        ("P1-P2", {"y": level, "angle": -tilt}, 2, "seat", None, 0.0),
+        ("P1-P2", {"y": level + 0.5e-7 * down.width, "angle": 1e-7 - tilt}, 2, "contact", None, 0.0),
+        ("P1-P2", {"y": level - 0.1, "angle": -tilt}, 2, "overlap", None, -0.1),
+    ]
+    for names, by, kind, relation, feature, gap in cases:
+        moved = replace(home[names[3:]], **{key: getattr(home[names[3:]], key) + value for key, value in by.items()})
+        (c,) = measure_contacts(clamp, {**home, names[3:]: moved}, pairs=[tuple(sorted(names.split("-")))])
+        assert (c.type, c.relation) == (kind, relation), (names, by)
+        assert feature in (None, c.feature)
+        assert gap is None or c.gap == pytest.approx(gap, abs=2e-7)
+        sure = "at least " * (names != "P1-P2")  # bodies of which one bound is attested
+        assert overlap(c) == (f"{c.a} overlaps {c.b} by {sure}{-c.gap:.4g} mm" if c.gap < -1e-6 else "")
+    bare, lowered = replace(clamp, connections={}), {**home, "P6": replace(home["P6"], y=0.5)}
+    words = [measure_contacts(bare, poses, pairs=[("P1", "P6")])[0].relation for poses in (home, lowered)]
+    assert words == ["interior contact", "none"]
+
+
+@pytest.mark.parametrize("part", ["P1", "P2", "P3", "P5"])
+def test_surfaces_at_a_point_are_those_that_sampling_finds_nearest(part):
+    """Points along each outline; the ends of a body are planes. On an arc's end it is a lip."""
+    solid, rng, T = parts(load_clamp())[part], np.random.default_rng(8), SectionPose(7.0, -9.0, 0.3).T()
+    rows, body, R = [], solid.bodies[0], T[:3, :3]
+    for drawn, edge in [(extrusion, edge) for extrusion in (body, *solid.holes) for edge in extrusion.profile.edges]:
+        if isinstance(edge, Arc):
+            points, normal = [edge.at(t) for t in np.linspace(edge.start_angle, edge.end_angle, 2001)], None
+            name = "round face" if edge.sweep > 0.0 else "arc"
+        else:
+            (x, y), points = np.subtract(edge.end, edge.start), np.linspace(edge.start, edge.end, 2001)
+            name, normal = "flat face", R @ drawn.frame[:, :2] @ (y, -x) / math.hypot(x, y)  # outlines go to the left
+        rows.append((name if drawn is body else "hole", drawn.frame, np.array(points), normal))
+    end_name, axis = "end face" if body.axis == "Y" else "flat face", body.frame[:, 2]
+    for _ in range(120):
+        name, frame, points, _ = rows[rng.integers(len(rows))]
+        ab = points[rng.choice([0, 2000, rng.integers(2001)])] + rng.choice([0.0, 2.0]) * rng.normal(size=2)
+        local = frame @ (*ab, rng.choice([0.5 * (body.start + body.end), body.start, body.end + 0.01, body.end - 3.0]))
+        near = [(abs(local @ axis - end), end_name, s * R @ axis) for end, s in ((body.start, -1.0), (body.end, 1.0))]
+        for kind, axes, outline, normal in rows:
+            away = np.hypot(*(outline - (local @ axes)[:2]).T)
+            is_lip = kind == "arc" and min(away[0], away[-1]) < 1e-7
+            near.append((away.min(), "lip" if is_lip else kind, normal))
+        found, least = surfaces_at(solid, T, R @ local + T[:3, 3], 0.02), min(away for away, _, _ in near)
+        sure, may = ([row for row in near if row[0] <= least + reach] for reach in (0.015, 0.025))
+        assert {name for _, name, _ in sure} <= {surface.name for surface in found} <= {name for _, name, _ in may}
+        for surface in [surface for surface in found if surface.name in ("flat face", "end face")]:
+            assert min(np.linalg.norm(surface.normal - n) for _, name, n in may if name == surface.name) < 1e-12

@@ -16,10 +16,6 @@ from clamp3d.clamp.dimensions import Wire
     [
         (lambda c: Wire(diameter=-3.0), "Wire: diameter: must be at least 1e-06, got -3.0"),
         (lambda c: Wire(diamter=3.0), "Wire: diamter is not a known key; did you mean diameter?"),
-        (
-            lambda c: replace(c, line=Wire(diameter=300.0)),
-            "Clamp: line: the diameter must be less than twice up_splint.width = 137 mm, got 300; are both in mm?",
-        ),
     ],
 )
 def test_wrong_values_in_python_are_one_line_too(make, message):
@@ -113,30 +109,25 @@ def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
         made(40.0, 60.0 - 23.8012 - 1e-6)
 
 
-def test_the_tilt_stops_where_edge_and_slot_touch_and_the_edges_lift_the_splint_no_further_than_they_must():
+@pytest.mark.parametrize("k", range(24))
+def test_the_tilt_stops_where_edge_and_slot_touch_and_the_edges_lift_the_splint_no_further_than_they_must(k):
     """Points of the tilted splint, turned by hand, against the saddle's edges and the upright shank."""
-    stopped = set()
-    for k in range(40):
-        clamp = whole_clamp(np.random.default_rng([5, k]))
-        down, saddle = clamp.down_splint, clamp.saddle
-        # The saddle's edges seen from the back's centre, when that rests in the apex.
-        edges = np.array([-0.5, 0.5]) * saddle.width
-        below = math.sqrt(saddle.radius**2 - 0.25 * saddle.width**2) - (saddle.radius - down.back_radius)
-        bottom = math.sqrt(max(down.back_radius**2 - 0.25 * down.slot_width**2, down.underside_depth**2))
-        u, v = np.array([(side * 0.5 * down.slot_width, v) for side in (-1.0, 1.0) for v in (down.face_depth, bottom)]).T
+    clamp = whole_clamp(np.random.default_rng([5, k]))
+    down, saddle = clamp.down_splint, clamp.saddle
+    below = math.sqrt(saddle.radius**2 - 0.25 * saddle.width**2) - (saddle.radius - down.back_radius)  # of the edges
+    bottom = math.sqrt(max(down.back_radius**2 - 0.25 * down.slot_width**2, down.underside_depth**2))
+    corners = [(0.5 * down.slot_width, side * v) for side in (-1.0, 1.0) for v in (down.face_depth, bottom)]
 
-        def lift(t):
-            return float((down.underside_depth - edges * math.sin(t)).max() / math.cos(t) - below)
+    def lift(t):
+        return (down.underside_depth + 0.5 * saddle.width * abs(math.sin(t))) / math.cos(t) - below
 
-        def room(t):
-            return float((np.sign(u) * (u * math.cos(t) + v * math.sin(t))).min()) - 0.5 * clamp.bolt.diameter
+    def room(t):
+        return min(u * math.cos(t) + v * math.sin(t) for u, v in corners) - 0.5 * clamp.bolt.diameter
 
-        for name, left in (("the saddle's edge", lambda t: -lift(t)), ("the slot", room)):
-            stop = clamp.tilt_stops[name]
-            assert left(stop) == pytest.approx(0.0, abs=1e-9)
-            assert stop <= 0.0 or left(0.5 * stop) > 0.0
-        assert clamp.tilt_stop == min(clamp.tilt_stops.values()) == clamp.tilt_stops[clamp.tilt_stopped_by]
-        stopped.add(clamp.tilt_stopped_by)
-        tilts = np.linspace(-0.5, 0.5, 9)
-        assert clamp.lifted(tilts) == pytest.approx([max(0.0, lift(t)) for t in tilts], abs=1e-9)
-    assert len(stopped) == 2
+    for name, left in (("the saddle's edge", lambda t: -lift(t)), ("the slot", room)):
+        stop = clamp.tilt_stops[name]
+        assert left(stop) == pytest.approx(0.0, abs=1e-9)
+        assert stop <= 0.0 or left(0.5 * stop) > 0.0
+    assert clamp.tilt_stop == min(clamp.tilt_stops.values()) == clamp.tilt_stops[clamp.tilt_stopped_by]
+    tilts = np.linspace(-0.5, 0.5, 9)
+    assert clamp.lifted(tilts) == pytest.approx([max(0.0, lift(t)) for t in tilts], abs=1e-9)
