@@ -43,7 +43,7 @@ class Mesh:
     vertices: Array
     faces: IntArray
     watertight: bool
-    rounding: float = 0.0
+    rounding: float
     notes: tuple[str, ...] = ()
 
     @property
@@ -234,7 +234,7 @@ def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Me
     if not is_closed(F):
         V, F = mesh.vertices, mesh.faces
     V.flags.writeable = F.flags.writeable = False
-    return Mesh(name, V, F, True)
+    return Mesh(name, V, F, True, mesh.rounding)
 
 
 def _arrays(vertices: ArrayLike, faces: ArrayLike, name: str, scale: float) -> tuple[Array, IntArray]:

@@ -271,7 +271,7 @@ def shares(groove: Groove, best: Search, side: Vector, end: Vector) -> tuple[flo
     if u + v == 0.0:
         m = edge_direction(groove, best)
         by_side, by_end = dot(side, m), dot(end, m)
-        if by_side * by_end < 0.0:
+        if by_side * by_end < 0.0 and abs(by_side) + abs(by_end) > 1e-12:  # else any mixture is square to the edge
             u, v = abs(by_end), abs(by_side)
     return u, v
 

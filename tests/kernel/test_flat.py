@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
-from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, rotation, signed_distance, translation
-from tests.kernel.oracle import surface_distance
+from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, groove_pieces, rotation, signed_distance, translation
+from tests.kernel.oracle import point_distance, surface_distance
 from tests.kinds import poses
 
 
@@ -84,10 +84,63 @@ def test_witnesses_lie_on_both_bodies_and_the_normal_is_unit():
         assert np.abs(q + a.distance * a.normal - p).max() <= tol
         on_groove = surface_distance(groove, q[None])[0]
         if not a.axis_inside:
-            assert on_groove <= tol or a.distance <= -0.5 * wire.length + tol  # a point within counts
+            if a.distance <= -0.5 * wire.length + tol:  # a point within counts
+                on_groove = point_distance(q[None], groove.radius, groove.half_angle, 0.5 * groove.length)[0]
+            assert on_groove <= tol
             assert abs(depth_in(wire, T, p[None])[0]) <= tol, (groove, wire, T.tolist())
             if a.distance < 0.0:
                 assert abs(depth_in(wire, T, q[None])[0] + a.distance) <= tol
+
+
+def off_part(groove, feature, q):
+    """How far a point is off the part of the groove that this names."""
+    name, R, a, (x, y, z) = Feature(feature).name, groove.radius, groove.half_angle, q
+    aside = (-x if name.endswith("_M") else x) - R * math.sin(a)
+    end = abs(z) - 0.5 * groove.length
+    off = [end if "END" in name or "CORNER" in name else max(end, 0.0)]
+    if "ARC" in name:
+        off.append(math.hypot(x, y) - R)
+    elif name != "END_FACE":
+        off += [y + R * math.cos(a), min(aside, 0.0) if "FLAT" in name or "EDGE" in name else aside]
+    return np.abs(off).max()
+
+
+@pytest.mark.parametrize("kind", [Cylinder, Capsule])
+def test_features_and_places_are_those_of_the_points(kind):
+    rng = np.random.default_rng(9)
+    for k in range(1500):
+        groove, wire, T = random_scene(rng)
+        T[1, 3] -= 2.0 * groove.radius * (k % 3 == 0)  # into the material
+        wire = kind(wire.radius, wire.length)
+        a, pieces = signed_distance(groove, wire, T), groove_pieces(groove, wire, T)
+        tol = 1e-11 * max(groove.radius, groove.length, wire.length, *np.abs(T[:3, 3]))
+        out = a.point_on_groove - T[:3, 3]
+        away = np.linalg.norm(out - a.along * T[:3, 2])  # from the place on the axis
+        if kind is Capsule or a.axis_inside:
+            inner = wire.radius if kind is Capsule else min(wire.radius, 0.5 * wire.length)
+            assert abs(away - abs(a.distance + inner)) <= tol
+        else:
+            assert abs(away - np.linalg.norm(np.cross(out, T[:3, 2]))) <= tol
+        if a.axis_inside or a.distance > -0.5 * wire.length + tol:
+            assert off_part(groove, a.feature, a.point_on_groove) <= tol
+        assert max(map(off_part, [groove] * 5, pieces.feature, pieces.point_on_groove)) <= tol
+
+
+def test_the_normal_at_contact_is_that_before_it():
+    rng, same = np.random.default_rng(10), 0
+    for _ in range(1500):
+        groove, wire, T = random_scene(rng)
+        before = signed_distance(groove, wire, T)
+        if before.distance < 1e-3 * groove.radius or 0.0 < np.hypot(*T[:2, 2]) < 1e-3:  # where a normal is ill defined
+            continue
+        left = rng.choice([50.0, 200.0]) * before.error_bound
+        T[:3, 3] -= (before.distance - left) * before.normal
+        at = signed_distance(groove, wire, T)
+        assert abs(at.distance - left) <= 2.0 * at.error_bound
+        if at.feature is before.feature < Feature.CORNER_M:  # an edge that is touched belongs to its faces too
+            same += 1
+            assert np.abs(at.normal - before.normal).max() <= 0.1
+    assert same > 400
 
 
 @pytest.mark.parametrize(

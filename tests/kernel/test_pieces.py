@@ -5,6 +5,7 @@ import pytest
 
 from clamp3d.kernel import Capsule, SweptArc, groove_pieces, rotation, signed_distance, translation
 from tests.kernel.oracle import load, surface_distance
+from tests.kernel.test_subgradient import moved
 
 CASES = load()
 
@@ -95,36 +96,25 @@ def test_an_axis_that_ends_in_the_plane_of_an_end_face_is_outside():
 def test_gradients_are_the_differences_where_those_agree_from_both_sides():
     """Those of the end faces also with the wire's end deep in the material, whichever way out is the shorter."""
     groove, step = SweptArc(7.0, 1.0, 20.0), 1e-6
-    rng, compared, through = np.random.default_rng(4), 0, {-1: 0, 1: 0}
-    for _ in range(250):
+    rng, compared, aside, through = np.random.default_rng(4), 0, 0, {-1: 0, 1: 0}
+    for case in range(250):
         wire = Capsule(float(rng.uniform(1.0, 6.0)), float(rng.uniform(4.0, 60.0)))
-        T = rotation(rng.normal(size=3), float(rng.uniform(-1.5, 1.5)))
+        T = rotation(rng.normal(size=3), float(rng.uniform(-1.5, 1.5)) * (case % 3 > 0))
         T[:3, 3] = rng.uniform((-15.0, -25.0, -25.0), (15.0, 5.0, 25.0))
         here = groove_pieces(groove, wire, T)
-        for k in range(3):
-            there = [groove_pieces(groove, wire, translation(*(s * step * np.eye(3)[k])) @ T).distance for s in (-1, 1)]
+        assert np.abs(np.linalg.norm(here.normal, axis=1) - 1.0).max() <= 1e-12
+        sideways = (here.distance < -wire.radius) & (here.normal[:, 2] == 0.0) & (np.arange(5) > 2)
+        assert np.abs(here.normal - here.gradient[:, :3])[sideways, :2].max(initial=0.0) <= 1e-9
+        aside += sideways.sum()
+        for k in range(6):
+            there = [groove_pieces(groove, wire, moved(T, np.eye(6)[k], s * step)).distance for s in (-1, 1)]
             back, forth = (here.distance - there[0]) / step, (there[1] - here.distance) / step
             smooth = np.abs(back - forth) < 1e-4
-            smooth[:3] &= (here.distance > -wire.radius).all()
+            smooth[:3] &= (here.distance > -wire.radius).all() | (case % 3 == 0 and k < 3)
             np.testing.assert_allclose(here.gradient[smooth, k], (0.5 * (back + forth))[smooth], atol=1e-3)
             compared += int(smooth.sum())
         for row, sign in ((3, -1.0), (4, 1.0)):
             if here.distance[row] < -wire.radius and abs(abs(here.gradient[row, 2]) - 1.0) < 1e-9:
                 through[int(sign * here.gradient[row, 2])] += 1
     assert compared > 1900
-    assert min(through.values()) > 5
-
-
-def test_normals_of_all_pieces_are_the_way_out():
-    """Also of an end face that the axis goes through, whose way out is sideways."""
-    rng = np.random.default_rng(5)
-    through = 0
-    for _ in range(400):
-        T = rotation(rng.normal(size=3), float(rng.uniform(-1.0, 1.0)))
-        T[:3, 3] = rng.normal(size=3) * [12.0, 12.0, 20.0]
-        found = groove_pieces(SweptArc(12.0, 1.2, 50.0), Capsule(2.0, 80.0), T)
-        aside = np.flatnonzero((found.distance[3:] < -2.0) & (found.normal[3:, 2] == 0.0)) + 3
-        through += len(aside)
-        assert np.abs(np.linalg.norm(found.normal, axis=1) - 1.0).max() <= 1e-12
-        assert np.abs(found.normal - found.gradient[:, :3])[aside, :2].max(initial=0.0) <= 1e-9
-    assert through > 20
+    assert min(*through.values(), aside) > 5

@@ -1,0 +1,107 @@
+"""Meshes: damage of every kind, whose count is known, is mended and noted; edges are those counted one by one."""
+
+import collections
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d.geometry.mesh import edges_of, is_closed, make_mesh
+from clamp3d.geometry.shells import inside_out, shells, volume, winding_numbers
+
+BOX, BALL = trimesh.creation.box((2.0, 3.0, 4.0)), trimesh.creation.icosphere(2, 2.0)
+CAVITY = trimesh.Trimesh(0.3 * BALL.vertices + (0.2, 0.5, 0.1), BALL.faces[:, ::-1], process=False)
+
+
+def bodies(rng):
+    """A ball with a cavity, up to two lesser boxes and balls beside it: vertices, faces, the rows of each surface."""
+    made = [CAVITY, BALL, *([BOX, BALL][k] for k in rng.integers(0, 2, rng.integers(0, 3)))]
+    V = [part.vertices * 0.9 ** (k > 1) + (9.0 * max(k - 1, 0), 0.0, 0.0) for k, part in enumerate(made)]
+    F = [part.faces + sum(map(len, V[:k])) for k, part in enumerate(made)]
+    return np.vstack(V), np.vstack(F), np.split(np.arange(sum(map(len, F))), np.cumsum([*map(len, F)])[:-1])
+
+
+def turned(F, rows):
+    F = F.copy()
+    F[rows] = F[rows][:, ::-1]
+    return F
+
+
+@pytest.mark.parametrize("winding", ["right", "some", "all", "body"])
+def test_a_damaged_mesh_is_mended_and_all_of_it_noted(winding):
+    rng = np.random.default_rng(0)
+    for _ in range(25):
+        V, F, rows = bodies(rng)
+        size, true, notes, last = len(V), volume(V, F), [], []
+        if winding == "some":
+            picks = np.concatenate([rng.choice(row, rng.integers(1, 6), replace=False) for row in rows])
+            F, last = turned(F, picks), [f"{len(picks)} triangles turned to one winding"]
+        elif winding == "all":
+            F, last = turned(F, slice(None)), ["inside out: all triangles turned"]
+        elif winding == "body" and len(rows) > 2:
+            F, last = turned(F, rows[2]), [f"a body of {len(rows[2])} triangles inside out: turned"]
+        F = rng.permutation(F)
+        if rng.random() < 0.5:  # one of them the other way round
+            doubles = F[rng.choice(len(F), 3, replace=False)]
+            F = np.vstack([F, np.roll(doubles, 1, axis=1), doubles[:1, ::-1]])
+            notes.append("4 doubled triangles left out")
+        if rng.random() < 0.5:  # folded, and along an edge
+            (a, b, _), V = F[0], np.vstack([V, V[F[0, :2]].mean(axis=0)])
+            F = np.vstack([F, [[a, b, b], [a, b, size]]])
+            notes.append("1 triangles without an area left out")
+        else:  # corners of its own for each triangle, all but equal
+            V, F = V[F].reshape(-1, 3), np.arange(3 * len(F)).reshape(-1, 3)
+            V += rng.uniform(-2e-10, 2e-10, V.shape)
+        made = make_mesh(np.vstack([V, [3 * [np.nan]]]), F, scale=0.25)
+        assert (made.watertight, list(made.notes), len(made.vertices)) == (True, notes + last, size)
+        assert volume(made.vertices, made.faces) == pytest.approx(true / 64.0, rel=1e-8)
+        assert len(made.faces) == sum(map(len, rows))
+        assert not inside_out(made.vertices, made.faces)
+
+
+def test_corners_are_one_within_a_billionth_of_the_extent_and_thin_is_within_the_rounding():
+    V, F = BOX.vertices[BOX.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
+    for apart, is_closed_so in ((3.9e-9, True), (4.1e-9, False)):  # the box is 4 mm high
+        V[0] = BOX.vertices[BOX.faces[0, 0]] * (1.0, 1.0, 1.0 + 0.5 * apart)
+        assert make_mesh(V, F).watertight == is_closed_so
+    # A corner more on an edge: the triangle that closes the mesh there is as high as the corner is off the edge.
+    (a, b, c), V, up = BOX.faces[0], BOX.vertices / 2.0, BOX.face_normals[0]
+    F = np.vstack([BOX.faces[1:], [[a, 8, c], [8, b, c], [a, b, 8]]])
+    for high, unit, thin in ((3.0, 2.0**-24, 1), (5.0, 2.0**-24, 0), (3.0, 2.0**-50, 0)):
+        corner = V[[a, b]].mean(axis=0) + high * 2.0**-24 * up
+        made = make_mesh(np.vstack([V, corner]), F, float32=unit == 2.0**-24)
+        assert (made.watertight, made.rounding, made.slivers.sum()) == (True, unit, thin)
+    assert make_mesh(np.float32(V), BOX.faces).rounding == 2.0**-24
+
+
+def test_edges_are_those_that_are_counted_one_by_one():
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        F = np.array([rng.choice(7, 3, replace=False) for _ in range(rng.integers(1, 12))])
+        sides = collections.defaultdict(list)
+        for k, (a, b, c) in enumerate(F.tolist()):
+            for p, q, across in ((a, b, c), (b, c, a), (c, a, b)):
+                sides[max(p, q), min(p, q)].append((k, across, p < q))
+        counted = {uses: [edge for edge in sorted(sides) if len(sides[edge]) == uses] for uses in range(1, 12)}
+        for uses in (1, 2, 3):
+            ends, rows, across = edges_of(F, uses)
+            assert ends.tolist() == [[low, high] for high, low in counted[uses]]
+            assert rows.tolist() == [[k for k, _, _ in sides[edge]] for edge in counted[uses]]
+            assert across.tolist() == [[c for _, c, _ in sides[edge]] for edge in counted[uses]]
+        assert is_closed(F) == all(sorted(up for _, _, up in some) == [0, 1] for some in sides.values())
+        if len({frozenset(face) for face in F.tolist()}) == len(F):
+            more, made = sum(len(counted[uses]) for uses in range(3, 12)), make_mesh(rng.normal(size=(7, 3)), F)
+            text = f"not closed: {len(counted[1])} edges with one triangle, {more} with more than two"
+            assert made.watertight or made.notes[-1].startswith(text)
+
+
+def test_what_a_surface_winds_round():
+    V, F, rows = bodies(np.random.default_rng(3))
+    assert sorted(row.tolist() for row in shells(F, len(V))) == [row.tolist() for row in rows]
+    assert volume(V + 1e7, F) == pytest.approx(volume(V, F), rel=1e-7)
+    x = np.random.default_rng(4).uniform(-2.5, 2.5, (40, 3))
+    out, into = np.linalg.norm(x, axis=1), np.linalg.norm(x - (0.2, 0.5, 0.1), axis=1)
+    sure = np.flatnonzero((abs(out - 2.0) > 0.1) & (abs(into - 0.6) > 0.05))
+    wanted = 1.0 * (out < 2.0) - (into < 0.6)
+    for some in (sure, sure[:8]):
+        assert winding_numbers(V, F, x[some]) == pytest.approx(wanted[some], abs=1e-9)
