@@ -266,14 +266,13 @@ class Clamp:
         """Tilts in rad at which the bodies stop the down splint, centred over the bolt."""
         down, r = self.down_splint, self.bolt.diameter / 2
         distance, angle = self._saddle_edge
-        # The flat underside comes down on the saddle's edge.
-        stops = {"the saddle's edge": math.acos(min(1.0, down.underside_depth / distance)) - angle}
-        # A corner of the slot meets the upright shank: half cos t - depth sin t = r, lower end and upper end alike.
-        half = down.slot_width / 2
-        for depth in (down.slot_bottom, down.face_depth):
-            far = math.hypot(half, depth)
-            stops["the slot"] = min(stops.get("the slot", math.inf), math.acos(r / far) - math.atan2(depth, half))
-        return stops
+        half, depth = down.slot_width / 2, down.slot_bottom
+        return {
+            # The flat underside comes down on the saddle's edge.
+            "the saddle's edge": math.acos(min(1.0, down.underside_depth / distance)) - angle,
+            # A lower corner of the slot meets the upright shank, before an upper one: half cos t - depth sin t = r.
+            "the slot": math.acos(r / math.hypot(half, depth)) - math.atan2(depth, half),
+        }
 
     def lifted(self, tilt: NDArray[np.float64]) -> NDArray[np.float64]:
         """How high (n,) over the saddle's apex the saddle's edges hold the centred down splint at a tilt (n,); mm."""

@@ -155,12 +155,12 @@ def _derivatives(section: Section, final: FinalState) -> Array:
     by_p = np.column_stack([conditions(n, h) - conditions(n, -h) for n in DIMENSIONS]) / (2.0 * h)
     A, k = final.gaps.gradient[active][:, free], len(active)
     hessian = -section.hessian(q, final.gaps, final.multipliers)[np.ix_(free, free)]
-    kkt = np.block([[hessian, -A.T], [A, np.zeros((k, k))]])
+    kkt = np.block([[hessian, A.T], [A, np.zeros((k, k))]])  # symmetric, so its own adjoint: the forces by -l
     # The inner edge moves with the down splint's place and tilt.
     lever, down, rows = section.lever, clamp.down_splint, np.zeros(SIZE)
     angle = float(q[S]) / lever
     rows[[D, U, S]] = 1.0, -1.0, math.cos(angle) - down.face_depth * math.sin(angle) / lever
-    adjoint, _, rank, _ = np.linalg.lstsq(kkt.T, np.append(rows[free], np.zeros(k)), _WELL_POSED)
+    adjoint, _, rank, _ = np.linalg.lstsq(kkt, np.append(rows[free], np.zeros(k)), _WELL_POSED)
     if rank < len(kkt):
         raise SolverError("no sensitivity: the final state is not isolated, its KKT matrix is singular")
     return np.asarray(by_p[-1] - adjoint @ by_p[:-1])

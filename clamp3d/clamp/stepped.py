@@ -62,7 +62,7 @@ def solve_stepped(
     q, tilt, tried = section.open_state(first * step), 0, 0
     for k in range(first, -_MOVES, -1):
         nearest = sorted(tilts, key=lambda i: (abs(i - tilt), abs(i)))
-        lower, tries = _first_free(section, q, k * step, [i * tilt_step for i in nearest])
+        lower, tries = _first_free(section, q, k * step, [i * tilt_step for i in nearest], settle=False)
         tried += tries
         if lower is None:
             break
@@ -111,9 +111,7 @@ def solve_bisection(
     return SteppedState(q, section.gaps(q), tried)
 
 
-def _first_free(
-    section: Section, q: Array, d: float, tilts: Sequence[float], settle: bool = False
-) -> tuple[Array | None, int]:
+def _first_free(section: Section, q: Array, d: float, tilts: Sequence[float], settle: bool) -> tuple[Array | None, int]:
     """The state with the down splint at ``d`` and the first tilt that is free, or None; and how many were tried."""
     for tried, tilt in enumerate(tilts, 1):
         state = _place(section, q, d, tilt, settle)
@@ -122,7 +120,7 @@ def _first_free(
     return None, len(tilts)
 
 
-def _place(section: Section, q: Array, d: float, tilt: float, settle: bool = False) -> Array | None:
+def _place(section: Section, q: Array, d: float, tilt: float, settle: bool) -> Array | None:
     """State with the down splint at (d, tilt) and the wires in a free place, or None; ``settle`` seeks the widest."""
     new = q.copy()
     new[D], new[S] = d, section.lever * tilt

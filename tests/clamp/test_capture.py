@@ -159,6 +159,11 @@ def test_the_map_is_of_closings_from_its_places(placed):
         start = open_start(section)
         start[2:4] += found.sideways[j], -found.height[i]
         assert close_from(section, start) == code
+    seat, (low, high) = open_start(section), section.reach("P7")
+    assert found.sideways + seat[2] == pytest.approx(np.linspace(low, high, 8))
+    seat[3] -= 3.0 * found.height[0]  # the heights are a third and two thirds of the way to the down splint
+    assert 2.0 * found.height[0] == pytest.approx(found.height[1])
+    assert section.gaps(seat).value.min() == pytest.approx(0.0, abs=1e-4)
     low, high = found.captured
     assert low < 0.0 < high
     inside = (found.sideways >= low) & (found.sideways <= high)

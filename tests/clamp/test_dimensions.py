@@ -11,17 +11,11 @@ from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import Wire
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda c: Wire(diameter=-3.0), "Wire: diameter: must be at least 1e-06, got -3.0"),
-        (lambda c: Wire(diamter=3.0), "Wire: diamter is not a known key; did you mean diameter?"),
-    ],
-)
-def test_wrong_values_in_python_are_one_line_too(make, message):
-    with pytest.raises(InputError) as found:
-        make(load_clamp())
-    assert str(found.value) == message
+def test_wrong_values_in_python_are_one_line_too():
+    with pytest.raises(InputError, match=r"^Wire: diameter: must be at least 1e-06, got -3\.0$"):
+        Wire(diameter=-3.0)
+    with pytest.raises(InputError, match=r"^Wire: diamter is not a known key; did you mean diameter\?$"):
+        Wire(diamter=3.0)
 
 
 def _changed(thing, path, value):
@@ -113,7 +107,7 @@ def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
 def test_the_tilt_stops_where_edge_and_slot_touch_and_the_edges_lift_the_splint_no_further_than_they_must(k):
     """Points of the tilted splint, turned by hand, against the saddle's edges and the upright shank."""
     clamp = whole_clamp(np.random.default_rng([5, k]))
-    down, saddle = clamp.down_splint, clamp.saddle
+    down, saddle, tilts = clamp.down_splint, clamp.saddle, np.linspace(-0.5, 0.5, 9)
     below = math.sqrt(saddle.radius**2 - 0.25 * saddle.width**2) - (saddle.radius - down.back_radius)  # of the edges
     bottom = math.sqrt(max(down.back_radius**2 - 0.25 * down.slot_width**2, down.underside_depth**2))
     corners = [(0.5 * down.slot_width, side * v) for side in (-1.0, 1.0) for v in (down.face_depth, bottom)]
@@ -129,5 +123,4 @@ def test_the_tilt_stops_where_edge_and_slot_touch_and_the_edges_lift_the_splint_
         assert left(stop) == pytest.approx(0.0, abs=1e-9)
         assert stop <= 0.0 or left(0.5 * stop) > 0.0
     assert clamp.tilt_stop == min(clamp.tilt_stops.values()) == clamp.tilt_stops[clamp.tilt_stopped_by]
-    tilts = np.linspace(-0.5, 0.5, 9)
     assert clamp.lifted(tilts) == pytest.approx([max(0.0, lift(t)) for t in tilts], abs=1e-9)

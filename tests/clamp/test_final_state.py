@@ -103,10 +103,12 @@ def test_a_face_ends_at_the_splints_outer_edge(clamp, beyond, above, splint):
         i = 2 * int(wire == "P7")
         q[i : i + 2] = edge + side * beyond, face + looks * above
         gaps = section.gaps(q)
-        least = min(value for value, pair in zip(gaps.value, gaps.pair, strict=True) if pair == (splint, wire))
+        least, k = min((gaps.value[k], k) for k, pair in enumerate(gaps.pair) if pair == (splint, wire))
         radius = section.pairs[splint, wire].cylinder.radius
         expected = math.hypot(beyond, max(above, 0.0)) if beyond > 0.0 else above
         assert least == pytest.approx(expected - radius, abs=1e-9)
+        if beyond > 0.0:
+            assert gaps.point[k] == pytest.approx((edge, face if above > 0.0 else q[i + 1]), abs=1e-9)
 
 
 def test_pairs_of_conductors_end_in_a_stated_result():
@@ -135,7 +137,7 @@ def test_pairs_of_conductors_end_in_a_stated_result():
 
 def test_a_start_that_overlaps_is_refused(clamp):
     section = Section(clamp, Cas())
-    with pytest.raises(InputError, match=r"P. and P. overlap by .* mm"):
+    with pytest.raises(InputError, match=r"P. and P. overlap by \d+\.\d+ mm"):
         solve_final_state(section, section.open_state(0.0))
 
 

@@ -79,7 +79,8 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
     first = run.path[0].poses
     for a, b in itertools.combinations(PARTS, 2):
         if {a, b} != {"P3", "P4"}:
-            assert volume(a, first[a].T(), b, first[b].T()) == 0.0, (a, b)
+            (low, high), (other_low, other_high) = (parts(run.clamp)[n].bounds_at(first[n].T()) for n in (a, b))
+            assert max((low - other_high).max(), (other_low - high).max()) >= 10.0 - 1e-9, (a, b)
     (ends,) = [w.poses for w in run.path if w.label == "nut on the bolt's end"]
     assert ends["P5"].y + run.clamp.nut.height == pytest.approx(ends["P4"].y, abs=1e-9)
     assert len({w.step for w in run.path}) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
@@ -104,6 +105,7 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     assert left == sorted(left)
     assert (first.a, first.b) == pair
     assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
+    assert "X {:z.3f}, Y {:z.3f}, Z {:z.3f}".format(*first.point) in str(refused.value)
     assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)
     scene = refused.value.scene  # for the viewer: the parts that are there, on the same way
     (motion,) = scene.motions
@@ -122,8 +124,10 @@ def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_f
     place = {name: pose.T() for name, pose in section.poses(open_start(section)).items()}
     groove = section.pairs["P1", "P6"]
     assert abs(place["P1"][0, 3] + groove.T_a_groove[0, 3]) > 0.1  # not above the line
-    ((origin, _),) = Insertion(section.clamp, [("P1", "P6")], place).way_out()
-    assert origin == "from above"
+    ((origin, length),) = Insertion(section.clamp, [("P1", "P6")], place).way_out()
+    assert origin == "from above"  # until its underside is over the line, and 20 mm more
+    top = section.clamp.line.radius - place["P1"][2, 3]
+    assert length == pytest.approx(top + section.clamp.up_splint.thickness + 20.0)
 
 
 def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():

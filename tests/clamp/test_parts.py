@@ -79,6 +79,14 @@ def test_other_grooves_major_arcs_too_give_closed_meshes(radius, depth, gap, err
     assert low - 1e-7 <= solid.volume <= high + 1e-7
 
 
+def test_a_slot_wider_than_the_round_back_comes_out_of_the_flat_underside():
+    down = replace(CLAMP.down_splint, slot_width=66.0)
+    assert down.slot_bottom == down.underside_depth
+    part = parts(replace(CLAMP, down_splint=down))["P2"]
+    low, high = volume_bounds(part, 1e-4)
+    assert low < mesh(part, 1e-4).volume < high
+
+
 def test_bad_values_say_what_is_wrong():
     for bad in (0.0, -1.0, math.nan, math.inf, 1e-7):
         with pytest.raises(InputError, match="mesh_error must be a finite length >= 1e-06 mm"):

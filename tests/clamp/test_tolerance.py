@@ -65,6 +65,23 @@ def test_small_tolerances_scatter_as_the_derivatives_say():
         assert distance - result.nominal == pytest.approx(linear, abs=1e-5)
 
 
+@pytest.mark.parametrize(("distribution", "spread"), [("uniform", 1.0 / 3.0**0.5), ("normal", 1.0 / 3.0)])
+def test_dimensions_scatter_by_their_tolerances(distribution, spread):
+    """Those of ISO 2768-1 class m by size; a wire's in percent."""
+    clamp = load_clamp()
+    spec = monte_carlo(clamp, n=1, distribution=distribution, wire_tolerance_percent=2.0).spec
+    tolerance = dict(zip(DIMENSIONS, spec.tolerance, strict=True))
+    chosen = ("line.diameter", "jumper.diameter", "up_splint.width", "up_splint.line_groove.radius", "saddle.radius")
+    assert [tolerance[name] for name in chosen] == pytest.approx([0.6534, 0.285, 0.5, 0.2, 0.3])
+    drawn = [montecarlo.sample_dimensions(spec, k) for k in range(400)]
+    unit = np.array([[(row[n] - dimension(clamp, n)) / t for n, t in tolerance.items()] for row in drawn])
+    assert (unit.mean(), *unit.std(axis=0)) == pytest.approx((0.0, *[spread] * len(DIMENSIONS)), abs=0.08)
+    assert (np.abs(unit).max() <= 1.0) == (distribution == "uniform")
+    sizes, allowed = (6.0, 30.0, 120.0, 400.0, 1000.0, 2000.0, 4000.0), (0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0)
+    assert tuple(map(montecarlo.general_tolerance, sizes)) == allowed
+    assert tuple(montecarlo.general_tolerance(size + 0.1) for size in sizes[:-1]) == allowed[1:]
+
+
 def test_what_does_not_clamp_is_counted_by_reason():
     result = monte_carlo(load_clamp(line="48.5"), n=4)
     assert result.nominal is None
