@@ -52,9 +52,7 @@ def judge(
 
 def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
     """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
-    if a.shape is not b.shape and a.shape != b.shape:
-        return False
-    return _moved_by(a, T) <= contact
+    return a is b and _moved_by(a, T) <= contact  # equal shapes share their model
 
 
 def _moved_by(model: Model, T: Array) -> float:
@@ -101,6 +99,7 @@ def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     low, high = outer.bounds
     middle, half = 0.5 * (inner.bounds[0] + inner.bounds[1]), 0.5 * (inner.bounds[1] - inner.bounds[0])
     centre = T[:3, :3] @ middle + T[:3, 3]
-    # The part touches each side of its box: somewhere it reaches at least half as far as the box in each direction.
-    reach = 0.5 * np.abs(T[:3, :3]) @ half - contact
+    # It touches each side of its box, so in any direction it reaches to a third of the box's extent below the middle:
+    # so far does the mean of the points on the three sides that are furthest along that direction.
+    reach = np.abs(T[:3, :3]) @ half / 3.0 + contact
     return bool(((centre + reach >= low) & (centre - reach <= high)).all())

@@ -2,6 +2,7 @@
 
 import math
 
+import fcl
 import numpy as np
 import pytest
 import shapely
@@ -12,17 +13,17 @@ from hypothesis import strategies as st
 from clamp3d import Scene, Verdict, check, distance, shapes
 from clamp3d.engine.batch import bounds_at_poses
 from clamp3d.engine.facets import rods_distance
-from clamp3d.engine.mesh_distance import are_apart, meshes_distance, surface_distance, within
+from clamp3d.engine.mesh_distance import are_apart, meshes_distance, nearest_points, surface_distance, within
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.overlap import common, deepest, thickness
-from clamp3d.engine.surface import Surface, at_edges
+from clamp3d.engine.overlap import cut_up
+from clamp3d.engine.surface import Surface, at_edges, fcl_pair, fcl_tree
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.pose import inverse, rotation, to_target, translation
+from clamp3d.geometry.pose import inverse, rotation, to_source, to_target, translation
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Profile
 from clamp3d.shapes import make_mesh
 from clamp3d.testing import assert_distance, body
-from tests.kinds import DRAWN, box_mesh, faceted_shape, poses
+from tests.kinds import DRAWN, TURNED, box_mesh, faceted_shape, poses
 
 QUICK = settings(deadline=None, max_examples=15, suppress_health_check=[*HealthCheck])
 FACETED = [faceted_shape(shape, 0.5) for shape in DRAWN]
@@ -73,43 +74,58 @@ def test_the_distance_of_two_meshes_is_between_its_bounds(i, j, T):
     assert are_apart(a, b, T) or found.lower < 1e-9
 
 
-@QUICK
-@given(SOME, SOME, poses(15.0), st.floats(0.01, 0.5))
-def test_errors_of_both_meshes_widen_the_bounds_by_their_sum(i, j, T, error):
-    a, b = surface(FACETED[i]), surface(FACETED[j])
-    plain = surface_distance(a, b, T, sharp)
-    loose = [Surface(s.vertices, s.faces, np.full(len(s.faces), error)) for s in (a, b)]
-    wide = surface_distance(*loose, T, sharp)
-    assert wide.lower <= plain.lower + 1e-9
-    assert wide.upper >= plain.lower + 2.0 * error - 1e-9  # an attested overlap loses both errors too
-    if plain.lower > 0.0:
-        assert wide.lower == pytest.approx(plain.lower - 2.0 * error, abs=1e-9)
-        assert wide.upper == pytest.approx(plain.upper + 2.0 * error, abs=1e-9)
+@pytest.mark.parametrize(("e", "f"), [(0.0, 0.0), (0.1, 0.0), (0.0, 0.2), (0.1, 0.2)])
+@pytest.mark.parametrize("gap", [2.0, 0.29, 0.0, -0.05, -0.5, -1.5])
+def test_errors_of_both_meshes_widen_the_bounds_by_their_sum(gap, e, f):
+    """Two boxes face to face: of an overlap the bounds are worth finding only where they can be enough."""
+    a, b, off = box_mesh((10.0, 10.0, 10.0), e), box_mesh((6.0, 6.0, 6.0), f), e + f
+    T = TURNED @ translation(0.2, 0.1, 8.0 + gap) @ inverse(TURNED)
+    for one, other, place in ((a, b, T), (b, a, inverse(T))):
+        one, other = (Surface(to_target(TURNED, s.vertices), s.faces, s.face_error) for s in (one, other))
+        assert are_apart(one, other, place) == (gap > off)
+        at_most, at_least = max(-gap, 0.0) + off, gap + off
+        for share in (0.99, 1.02):
+            limit = -share * at_most - 1e-9
+            found = surface_distance(one, other, place, lambda d, limit=limit: d.lower >= limit)
+            assert found.upper == pytest.approx(at_least, abs=1e-9)
+            assert found.upper >= at_least
+            if gap >= 0.0:
+                assert found.lower == pytest.approx(gap - off, abs=1e-9)
+            elif share > 1.0:
+                assert -1.02 * at_most - 1e-9 <= found.lower <= -at_most
+            else:
+                assert found.lower == -math.inf
+            assert found.lower <= gap - off
+        decided = surface_distance(one, other, place, lambda d: d.upper < 0.0)
+        assert (decided.lower == -math.inf) == (gap < 0.0)
 
 
-@QUICK
-@given(SOME, SOME, poses(12.0))
-def test_no_sampled_depth_is_above_the_thickness(i, j, T):
-    """And it is no idle bound: sharpened to the end it is within a factor of the deepest sample."""
-    a, b = surface(FACETED[i]), surface(FACETED[j])
-    shared = common(a, b, T)
-    if shared is None:
-        return
-    truth = depths(a, b, T)
-    bound = thickness(a, b, T, shared, lambda bound: bound <= 1.1 * truth, 60_000)
-    assert truth <= bound + 1e-9
-    if math.isfinite(bound):
-        point, at = deepest(a, b, T, shared)
-        assert point <= bound + 1e-9 or not a.contains(at[None])[0]
-
-
-def test_the_thickness_of_a_slab_is_its_own():
-    """Falsifiable: two boxes 0.3 mm in each other, along their faces."""
-    a, b, T = box_mesh((10.0, 10.0, 10.0)), box_mesh((6.0, 6.0, 6.0)), translation(0.2, 0.1, 7.7)
-    bound = thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.31, 60_000)
-    assert 0.3 - 1e-9 <= bound <= 0.31
-    assert thickness(a, b, T, common(a, b, T), lambda bound: bound <= 0.29, 60_000) >= 0.3 - 1e-9
-    assert common(a, b, translation(0.0, 0.0, 8.1)) is None
+def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound():
+    """Triangles across a bracket and a box: their bounds close in on the furthest point, whatever is cut and how."""
+    rng, one, other = np.random.default_rng(4), Surface(BRACKET.vertices, BRACKET.faces), box_mesh((30.0, 20.0, 10.0))
+    weights = rng.dirichlet(np.ones(3), 200)
+    for k in range(8):
+        T = TURNED if k else np.eye(4)
+        triangles = rng.uniform((0.0, 0.0, 0.0), (40.0, 30.0, 20.0), (4, 3, 3))
+        first, last = None, None
+        for pieces in cut_up(one, other, T, triangles, 4000):
+            normal = np.cross(
+                pieces.triangles[:, 1] - pieces.triangles[:, 0], pieces.triangles[:, 2] - pieces.triangles[:, 0]
+            )
+            area = 0.5 * np.linalg.norm(normal, axis=1).sum()
+            first, last = area if first is None else first, pieces
+            assert area == pytest.approx(first, rel=1e-9)
+        points = np.einsum("wc,mcx->mwx", weights, last.triangles)
+        away = [
+            s.distance(p.reshape(-1, 3)).reshape(p.shape[:2]) for s, p in ((one, points), (other, to_source(T, points)))
+        ]
+        assert (last.at_most >= np.max(away, axis=2).T - 1e-9).all()
+        middles = last.triangles.mean(axis=1)
+        assert last.middles == pytest.approx(np.maximum(one.distance(middles), other.distance(to_source(T, middles))))
+        points = np.einsum("wc,mcx->mwx", rng.dirichlet(np.ones(3), 6000), triangles).reshape(-1, 3)
+        truth = np.maximum(one.distance(points), other.distance(to_source(T, points))).max()
+        assert truth - 1e-9 <= last.at_most.max() <= 1.03 * truth
+        assert len(last.triangles) <= 4 + 6000
 
 
 @pytest.mark.parametrize("out", [-5.0, -0.1, 0.0, 0.3, 2.0, 9.0])
@@ -171,21 +187,59 @@ def test_flat_faces_of_a_part_with_a_hole_stay_exact():
     assert row.distance.upper - row.distance.lower < 1e-5
 
 
-@settings(max_examples=40, deadline=None)
-@given(wedge=st.floats(0.15, 3.0))
-def test_error_at_a_knife_edge_reaches_the_true_edge(wedge):
-    """A wedge whose one face bulges by 0.1 mm: the true edge is 0.1 / sin(wedge) from the edge of the mesh."""
-    x = 10.0
-    profile = [(0.0, 0.0), (-x, 0.0), (-x * math.cos(wedge), -x * math.sin(wedge))]
-    wedge_mesh = trimesh.creation.extrude_polygon(shapely.Polygon(profile[::-1]), 5.0)
-    top = np.abs(wedge_mesh.face_normals @ [0.0, 1.0, 0.0] - 1.0) < 1e-9
-    error = at_edges(np.array(wedge_mesh.vertices), np.array(wedge_mesh.faces), np.where(top, 0.1, 0.0))
-    # The bulged face y = 0.1 meets the flat side's plane beyond the edge.
-    edge = np.array([0.1 / math.tan(wedge), 0.1, 2.5])
-    surface = Surface(np.array(wedge_mesh.vertices), np.array(wedge_mesh.faces), error)
-    (distance,), _, _ = surface.nearest(edge[None])
-    assert distance <= error.max() + 1e-12
-    assert error[~top].max() == 0.0
+@pytest.mark.parametrize(
+    ("angle", "errors", "apart", "widened"),
+    [
+        (60, (0.1, 0.2), None, (0.3 / math.sin(math.pi / 3), 0.3 / math.sin(math.pi / 3))),
+        (30, (0.1, 0.0), None, (0.2, 0.0)),  # of the flat face every point is known
+        (60, (0.1, 0.2), False, (0.1, 0.2)),  # one patch
+        (120, (0.1, 0.2), None, (0.3, 0.3)),
+        (120, (0.1, 0.0), None, (0.1, 0.0)),
+        (160, (0.1, 0.2), None, (0.1, 0.2)),  # no edge of the part's
+        (160, (0.1, 0.2), True, (0.3, 0.3)),
+        (300, (0.1, 0.2), None, (0.3, 0.3)),
+        (300, (0.0, 0.2), None, (0.0, 0.2)),
+        (1, (0.1, 0.0), None, (0.1 / math.sin(math.radians(1)), 0.0)),
+    ],
+)
+def test_errors_beside_an_edge_reach_the_true_edge(angle, errors, apart, widened):
+    """Two faces, the material between them; where both bulge the true edge is where the lines beside them cross."""
+    w = math.radians(angle)
+    V = np.array([(0, 0, 0), (0, 0, 1), (3, 0, 0), (3, 0, 1), (3 * math.cos(w), 3 * math.sin(w), 0)])
+    V = to_target(TURNED, np.vstack([V, V[4] + (0, 0, 1)]))
+    F = np.array([(0, 2, 3), (0, 3, 1), (0, 1, 5), (0, 5, 4)])
+    e, f = errors
+    for step in (1, -1):
+        patch = None if apart is None else np.array([0, 0, int(apart), int(apart)])[::step]
+        found = at_edges(V, F[::step], np.array([e, e, f, f])[::step], patch)
+        assert found[::step] == pytest.approx([e, *widened, f], rel=1e-9)
+    if angle < 90 and apart is None:
+        assert math.sqrt(e * e + f * f + 2.0 * e * f * math.cos(w)) / math.sin(w) <= max(widened) * (1.0 + 1e-9)
+
+
+def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_elsewhere():
+    """Bounds by groups of errors against each triangle alone; on an edge the errors of all triangles around count."""
+    rng = np.random.default_rng(5)
+    ball, far = trimesh.creation.icosphere(subdivisions=2, radius=10.0), box_mesh((1.0, 2.0, 3.0))
+    for k in range(7):
+        most = 10.0 ** rng.uniform(-3.0, 0.0)
+        error = rng.choice([0.0, 1.0], len(ball.faces)) * most * 4.0 ** -rng.uniform(0.0, 6.0, len(ball.faces))
+        error[0] = most if k else 0.0
+        one, T = Surface(ball.vertices, ball.faces, error if k else 0.0 * error), TURNED.copy()
+        T[:3, 3] = rng.normal(size=3)
+        T[:3, 3] *= 14.0 / np.linalg.norm(T[:3, 3])
+        each = [fcl_tree(one.vertices, row[None]) for row in one.faces]
+        gaps = np.array([fcl.distance(*fcl_pair(tree, far.bvh, T)) for tree in each])
+        lower, upper, *_ = nearest_points(one, far, T) if k % 2 else nearest_points(far, one, inverse(T))
+        assert upper == pytest.approx(gaps.min(), abs=1e-9)
+        coarse = np.where(one.face_error > 0.0, np.maximum(4.0 * one.face_error, most / 64.0), 0.0)
+        assert (gaps - np.minimum(coarse, most)).min() - 1e-9 <= lower <= (gaps - one.face_error).min() + 1e-9
+        middles, near = (
+            ball.triangles_center,
+            (ball.faces[:, None, :, None] == ball.faces[None, :, None, :]).any((2, 3)),
+        )
+        assert one.error_at(middles) == pytest.approx(np.where(near, one.face_error, 0.0).max(axis=1))
+        assert one.error_at(1.01 * middles) == pytest.approx(one.face_error.max())
 
 
 def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():

@@ -5,16 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Distance, Motion, Scene, Verdict, check, distance, shapes
+from clamp3d.engine.judge import judge, kind_of_overlap
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.verdict import Thresholds
+from clamp3d.geometry.pose import to_target
 from clamp3d.kernel import SweptArc, rotation, translation
+from clamp3d.shapes import MeshShape, make_mesh
 from tests.kinds import measured_alike
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
 WIRE, CUBE = shapes.cylinder(6.935, 80.0), shapes.box((10, 10, 10))
+CACHE = ModelCache()
 QUARTER = rotation([0, 1, 0], math.pi / 2)
 
 
@@ -113,6 +120,52 @@ def test_without_depths_an_overlap_is_at_least():
     assert found.lower == -math.inf
     assert -3.0 <= found.upper < -0.01
     assert check(scene).pairs[0].distance.depth == pytest.approx(3.0, abs=1e-9)
+
+
+# --- Which holds which ---------------------------------------------------------------------------------------------
+
+
+def kind(a, b, T, contact):
+    return kind_of_overlap(CACHE.model(a), CACHE.model(b), T, contact).value
+
+
+@pytest.mark.parametrize("error", [0.0, 0.1])
+def test_a_part_is_contained_that_stands_out_by_no_more_than_its_threshold_and_its_errors(error):
+    cube, box = trimesh.creation.box((2.0, 2.0, 2.0)), shapes.box((9.0, 9.0, 9.0))
+    small = MeshShape(make_mesh(cube.vertices, cube.faces), "off", error=error)
+    for out, verdict in ((0.0095, "contained"), (0.0105, "clash")):
+        T = translation(3.5 + error + out, 0.0, 0.0)
+        assert kind(box, small, T, 0.01) == verdict
+        assert kind(small, box, translation(-T[0, 3], 0.0, 0.0), 0.01) == verdict
+    large = MeshShape(make_mesh(4.5 * cube.vertices, cube.faces), "off", error=error)
+    assert kind(large, small, translation(3.5 + 2.0 * error + 0.0095, 0.0, 0.0), 0.01) == "contained"
+    assert kind(large, small, translation(3.5 + 2.0 * error + 0.0105, 0.0, 0.0), 0.01) == "clash"
+
+
+def test_a_round_part_that_fills_another_is_contained_though_both_meshes_are_off():
+    assert kind(shapes.cylinder(5.0, 9.0), shapes.cylinder(5.0, 4.0), np.eye(4), 1e-6) == "contained"
+    assert kind(shapes.cylinder(5.0, 9.0), shapes.cylinder(5.01, 4.0), np.eye(4), 1e-6) == "clash"
+
+
+@pytest.mark.parametrize("out", [0.0, 0.009, -0.009])
+def test_a_tetrahedron_fills_a_box(out):
+    """No part is further from the middle of its own box: by a third of the box's extent."""
+    made = trimesh.convex.convex_hull(np.array([(-1.0, -1, -1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]))
+    T = np.linalg.inv(np.linalg.qr(np.array([(1.0, 1.0, 1.0), (0.0, 1.0, 0.3), (0.0, 0.0, 1.0)]).T)[0])
+    T = np.block([[T * np.linalg.det(T), np.zeros((3, 1))], [np.eye(4)[3:]]])
+    points = to_target(T, made.vertices)
+    T[:3, 3] = (out, 0.0, 0.0) - 0.5 * (points.min(axis=0) + points.max(axis=0))
+    part = MeshShape(make_mesh(made.vertices, made.faces), "off")
+    assert kind(shapes.box(tuple(np.ptp(points, axis=0))), part, T, 0.01) == "contained"
+
+
+def test_what_an_interference_leaves_open_the_depth_decides():
+    """A rim of a cylinder and an edge of a box: a point is 0.01 mm deep to 0.002, and it takes 0.0154 to part them."""
+    a, b = CACHE.model(shapes.cylinder(5.0, 10.0)), CACHE.model(shapes.box((6.0, 6.0, 6.0)))
+    T = translation(-7.947, -0.014, 7.947) @ rotation((-1.9, -1.1, 1.6), 1.1)
+    verdict, distance = judge(a, b, T, from_boxes(a, b, T), Thresholds(contact=0.01), None)
+    assert verdict is Verdict.CLASH
+    assert -0.0154 == pytest.approx(distance.lower, abs=1e-4) == distance.upper
 
 
 # --- Where they overlap -----------------------------------------------------------------------------------------------
