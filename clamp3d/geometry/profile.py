@@ -169,7 +169,7 @@ class Arc:
 
         A full circle has no corner on the arc. No tangent spans more than a quarter turn: half a turn has no corner.
         """
-        n = max(self.chord_count(mesh_error), 4 * math.ceil(abs(self.sweep) / (2.0 * math.pi)))
+        n = max(self.chord_count(mesh_error), 4)
         step = self.sweep / n
         outer_arc = Arc(self.centre, self.radius / math.cos(0.5 * step), self.start_angle, self.end_angle)
         corners = [outer_arc.at(self.start_angle + (k + 0.5) * step) for k in range(n)]

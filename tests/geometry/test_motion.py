@@ -118,6 +118,11 @@ def test_the_first_of_several_contacts_is_found_not_the_deepest(kind):
         (lambda: first_contact(GROOVE, WIRE, DROP, np.zeros((4, 4))), "T_a_b must have the last"),
         (lambda: first_contact(GROOVE, WIRE, DROP, margin=math.nan), "margin must be a finite"),
         (lambda: min_clearance(GROOVE, WIRE, 3), "motion must be a Motion"),
+        (lambda: Motion.translate((0, 0, -1.1e9)), "by must be three lengths up to 1e.09 mm"),
+        (lambda: Motion.screw((0, 0, 1), 1.0, travel=-1.1e9), "travel must be up to 1e.09 mm, got -1.1e.09"),
+        (lambda: Motion.to_pose(translation(0.0, 1.1e9, 0.0)), "offset of to must be three lengths"),
+        (lambda: DROP.at(-1.1e6), "t must be from 0 to 1 .or at most 1e.06 times"),
+        (lambda: Motion.translate((0, 0, 1), parts=("a", 3)), "part of a motion must be"),
     ],
 )
 def test_bad_motions_are_named(call, words):
@@ -137,3 +142,21 @@ def test_a_diagonal_way_down_onto_a_flat_face(side, slope):
     assert least.evaluations < 100
     low = Motion.translate((side * 25.0 / slope, -25.0, 0.0))
     assert first_contact(GROOVE, WIRE, low, start).t == pytest.approx((30.0 - 10.5) / 25.0, abs=1e-12)
+
+
+def test_a_screw_leads_to_its_pose_at_constant_rates_and_no_faster_than_its_bound():
+    rng = np.random.default_rng(1)
+    for k in range(60):
+        turns = [rotation(rng.normal(size=3), rng.uniform(0.0, 3.0)) for _ in "ab"]
+        start, to = (translation(*rng.normal(size=3) * 9.0) @ turns[i * (k % 6 > 0)] for i in (0, 1))
+        motion = Motion.to_pose(to).resolved(start)
+        np.testing.assert_allclose(motion.at(0.3, motion.at(0.7, start)), to, atol=1e-12)
+        wider = replace(motion, travel=motion.travel + np.cross(motion.axis, (1.0, 2.0, 3.0)))
+        assert (motion.is_screw, wider.is_screw) == (True, k % 6 == 0)
+        points = motion.point + rng.normal(size=(8, 3)) * 5.0
+        out = [np.linalg.norm(np.cross(p - motion.point, motion.axis)) for p in points]
+        np.testing.assert_allclose(motion.from_axis(points), out, atol=1e-12)
+        way = (motion.at(1e-6) - np.eye(4)) @ np.vstack([points.T, np.ones(8)]) * 1e6
+        assert np.linalg.norm(way, axis=0).max() - 1e-4 <= motion.speed(points)
+        turn = Motion.screw(motion.axis, -2.0, point=motion.point)  # of a mere turn the bound is met
+        assert turn.speed(points) == pytest.approx(2.0 * max(out), rel=1e-12)

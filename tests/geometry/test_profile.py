@@ -5,11 +5,14 @@ import math
 import numpy as np
 import pytest
 import shapely
+import trimesh
 from shapely import Polygon
 
 from clamp3d.errors import InputError
-from clamp3d.geometry.meshing import _polygons
+from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.meshing import _polygons, enclosed, enclosing, mesh, volume_bounds
 from clamp3d.geometry.profile import Arc, Profile, Segment, sagitta
+from clamp3d.geometry.shapes import Solid
 
 
 def bulging(p, q, bulge):
@@ -79,6 +82,7 @@ def test_polygons_keep_their_error_and_their_side():
             corners = arc.chords(error, arc.start)
             assert len(corners) == n
             assert n % 2 == 0
+            assert len(arc.tangents(error, arc.start)) == max(n, 4) + 1
             assert np.hypot(*(np.array(corners) - arc.centre).T) == pytest.approx(arc.radius, abs=1e-9)
             wider = sagitta(arc.radius, abs(arc.sweep) / (n - 2)) if n > 2 else np.inf
             assert arc.sagitta(n) <= error * (1.0 + 1e-9) < wider * (1.0 + 2e-9)
@@ -109,8 +113,8 @@ def test_hexagons_and_rectangles_have_their_sides():
     assert np.hypot(*corners.T) == pytest.approx(30.0 / math.sqrt(3.0), abs=1e-12)
     assert [math.dist(edge.start, edge.end) for edge in hexagon.edges] == pytest.approx([30.0 / math.sqrt(3.0)] * 6)
     assert hexagon.bounds[1] == pytest.approx((30.0 / math.sqrt(3.0), 15.0))
-    assert Profile.rectangle(4.0, 6.0, (1.0, -2.0)).bounds == ((-1.0, -5.0), (3.0, 1.0))
-    assert Profile.rectangle(4.0, 6.0, (1.0, -2.0)).area == 24.0
+    assert Profile.rectangle(4.0, 6.0, (11.0, -12.0)).bounds == ((9.0, -15.0), (13.0, -9.0))
+    assert Profile.rectangle(4.0, 6.0, (11.0, -12.0)).area == 24.0
 
 
 def edges(*corners):
@@ -128,6 +132,10 @@ OPEN = (*edges((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))[:2], Segment((1.0, 1.1), (0.0
         (lambda: Profile(edges((0.0, 0.0), (1.0, 1.0), (1.0, 0.0))), "counter-clockwise"),
         (lambda: Profile.of((0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.5)), rf"{CROSSED}\[1.1111"),
         (lambda: Profile.of((-3, -1), Arc((0, 0), 3.0, -1.5, 1.5), (-3, 1), (4.0, 0.5), (-4, 0)), CROSSED),
+        (
+            lambda: Profile.of((-3e-3, -1e-3), Arc((0, 0), 3e-3, -1.5, 1.5), (-3e-3, 1e-3), (4e-3, 0), (-4e-3, 0)),
+            CROSSED,
+        ),
         # At a corner, and twice round.
         (lambda: Profile.of((1.0, 1.0), (0.0, 3.0), (2.0, 3.0), (1.0, 1.0), (0.0, 0.0), (5.0, 0.0)), CROSSED),
         (lambda: Profile.of((0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (0.0, 0.0), (3.0, 0.0), (0.0, 3.0)), CROSSED),
@@ -146,3 +154,24 @@ def test_an_outline_may_touch_itself_and_run_along_itself():
     assert Profile.of((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0), *bridge).area == 72.0
     crescent = [Arc((0.0, 0.0), 5.0, 0.0, math.pi), Arc((-1.0, 0.0), 4.0, math.pi, 0.0), (4.0, 0.0)]
     assert Profile.of(*crescent).area == pytest.approx(4.5 * math.pi)
+
+
+def test_what_is_drawn_of_an_outline_is_its_points_along_an_axis():
+    rng, drill = np.random.default_rng(2), Profile.circle(1.0, (0.5, 0.2))
+    assert len(drill.polygon(0.1, "outer")) == drill.arcs[0].chord_count(0.1)
+    for k, profile in enumerate(outlines(np.random.default_rng(0), 30)):
+        chords, hole = Polygon(profile.polygon(0.3)), Polygon(drill.polygon(0.3))
+        if not chords.contains(hole.buffer(0.5)):
+            continue
+        (start, end), axis, (a, b) = np.sort(rng.uniform(-9.0, 9.0, 2)), "YZ"[k % 2], points(profile, 500).T
+        corners = np.hstack([[a, z + 0.0 * a, -b] if axis == "Y" else [a, b, z + 0.0 * a] for z in (start, end)]).T
+        body, n = Extrusion(profile, axis, start, end), rng.normal(size=3)
+        assert (corners @ n).max() - 1e-9 <= body.support(n) <= (corners @ n).max() + 1e-2
+        solid = Solid("drilled", (body,), (Extrusion(drill, axis, start, end),), volume=body.volume)
+        made, (lost, gained) = mesh(solid, 0.3), profile.chord_areas(0.3)
+        assert made.volume == pytest.approx((end - start) * (chords.area - hole.area), rel=1e-9)
+        assert made.metadata["chord_error"] == max(profile.chord_error(0.3), drill.chord_error(0.3))
+        bounds = body.volume + (end - start) * np.array([-lost, gained + math.pi - hole.area])
+        assert volume_bounds(solid, 0.3) == pytest.approx(bounds)
+        inner, outer = (trimesh.Trimesh(*make(solid, 0.3)).volume for make in (enclosed, enclosing))
+        assert inner < body.volume - math.pi * (end - start) < outer

@@ -11,7 +11,7 @@ from clamp3d import InputError, distance
 from clamp3d.geometry.profile import Profile
 from clamp3d.geometry.shells import volume
 from clamp3d.kernel import rotation, translation
-from clamp3d.shapes import box, extrusion, mesh, sphere
+from clamp3d.shapes import Hole, MeshShape, SweptArc, box, cylinder, extrusion, groove_block, mesh, sphere
 
 ANGLE = [(0.0, 0.0), (10.0, 0.0), (10.0, 2.0), (2.0, 2.0), (2.0, 10.0), (0.0, 10.0)]
 
@@ -70,3 +70,37 @@ def test_a_surface_that_is_flat_to_rounding_has_no_volume():
     flat = (box.vertices * (1.0, 1.0, 0.0)) @ rotation((1.0, 2.0, 3.0), 0.7)[:3, :3].T + (100.0, 200.0, 300.0)
     assert volume(flat, box.faces) == 0.0
     assert volume(box.vertices, box.faces) == pytest.approx(60.0)
+
+
+def plate(at, axis="z", radius=2.0):
+    return box((10.0, 20.0, 6.0), holes=[Hole(radius, at, axis)])
+
+
+def block(width=50.0, height=20.0, half=1.0, **more):
+    return groove_block(SweptArc(7.0, half, 50.0), width, height, **more)
+
+
+REACH, OTHER = 7.0 * math.sin(1.0), 5.0 * math.sin(0.9)
+
+
+@pytest.mark.parametrize(
+    ("make", "limit", "words"),
+    [
+        (lambda x: plate((x, 1.0)), 7.0, r"at \(.*, 1.0\) lies beside"),
+        (lambda x: plate((5.0 + x, -10.0 - x)), math.sqrt(2.0), "lies beside"),
+        (lambda x: plate((1.0, -x), "y"), 5.0, "lies beside"),
+        (lambda x: plate((1.0, -2.0), radius=x), math.hypot(6.0, 12.0), "leaves nothing of the part"),
+        (lambda x: plate((1.0, -2.0), "y", radius=x), math.hypot(6.0, 5.0), "leaves nothing of the part"),
+        (lambda x: cylinder(5.0, 1.0, bore=x), 5.0, "bore must be between"),
+        (lambda x: block(1.0 / x), 0.5 / REACH, r"x = 0 mm leaves the block: width must be > 11\.78"),
+        (lambda x: block(1.0 / x, 40.0, 2.0), 1.0 / 14.0, "width must be > 14 mm"),
+        (lambda x: block(others=[(x, 5.0, 0.9)]), 25.0 - OTHER, "leaves the block: width must be > 50 mm"),
+        (lambda x: block(height=1.0 / x), 1.0 / (7.0 - 7.0 * math.cos(1.0)), r"height must be > 3\.217"),
+        (lambda x: block(others=[(-1.0 / x, 5.0, 0.9)]), 1.0 / (REACH + OTHER), r"must be > 9\.806"),
+        (lambda x: MeshShape(sphere(2.0).mesh, error=x), 1e5, "error of a mesh must be >= 0 and < 100000 mm"),
+    ],
+)
+def test_what_does_not_fit_is_refused_from_its_limit_on(make, limit, words):
+    make(limit * (1.0 - 1e-9))
+    with pytest.raises(InputError, match=words):
+        make(limit * (1.0 + 1e-9))
