@@ -105,8 +105,7 @@ def make_mesh(
         notes.append(fault)
     if watertight:
         F = _outward(V, F, name, notes)
-        if fault or len(shells(F, len(V))) > 1:
-            V, F = _united(V, F, notes)
+        V, F = _united(V, F, notes, pinched=bool(fault))
     mesh = Mesh(name, V, F, watertight, rounding, tuple(notes))
     slivers = mesh.slivers
     if slivers.all():
@@ -171,8 +170,14 @@ def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
     return F
 
 
-def _united(V: Array, F: IntArray, notes: list[str]) -> tuple[Array, IntArray]:
-    """A closed mesh without the walls between bodies that overlap or touch, which are no surface of what they make."""
+def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[Array, IntArray]:
+    """A closed mesh without the walls between bodies that overlap or touch, which are no surface of what they make.
+
+    ``pinched``: whether bodies share vertices, so that they are one connected surface.
+    """
+    connected = shells(F, len(V))
+    if len(connected) == 1 and not pinched:
+        return V, F
     import manifold3d
 
     def as_manifold(vertices: Array, faces: IntArray) -> Any:
@@ -183,9 +188,12 @@ def _united(V: Array, F: IntArray, notes: list[str]) -> tuple[Array, IntArray]:
         mesh = manifold.to_mesh64()
         return np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
 
-    surfaces = sorted(as_manifold(V, F).decompose(), key=lambda surface: float(surface.volume()))
+    surfaces = [as_manifold(*_used(V, F[rows])) for rows in connected]
+    if pinched:  # only then, since it takes long for many bodies
+        surfaces = [part for surface in surfaces for part in surface.decompose()]
+    surfaces.sort(key=lambda surface: float(surface.volume()))
     solids = [surface for surface in surfaces if surface.volume() > 0.0]
-    if len(solids) < 2:
+    if len(solids) < 2 or any(surface.is_empty() for surface in surfaces):
         return V, F
     bodies = [*solids]
     for corners, triangles in map(arrays, surfaces[: -len(solids)]):  # cavities, each of the smallest solid round it
