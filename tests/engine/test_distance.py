@@ -194,3 +194,29 @@ def test_two_answers_together_have_the_points_of_the_shorter_and_the_normal_that
         assert met.point_a is x
         assert met.normal is y
     assert loose.meet(replace(proven, normal=None)).normal is x
+
+
+def test_the_nearer_of_two_pieces_and_whether_it_is_the_only_one():
+    p, q = np.eye(3)[:2]
+    near, far = Distance(1.0, 1.0, p, p, unique=True, method="near"), Distance(2.0, 2.0, q, q, unique=True)
+    for other, expected, unique in (
+        (far, (1.0, 1.0), True),
+        (replace(far, lower=0.5), (0.5, 1.0), None),  # the other may be nearer
+        (replace(near, point_a=q, method="other"), (1.0, 1.0), False),
+        (replace(near, point_a=p + 1e-9), (1.0, 1.0), True),  # one place
+        (replace(near, point_a=p + 1e-9, upper=1.1), (1.0, 1.0), None),
+        (replace(near, point_a=None), (1.0, 1.0), None),
+    ):
+        for found in (near.union(other), other.union(near)):
+            assert ((found.lower, found.upper), found.unique) == (expected, unique)
+            assert found.point_a is not q or other.upper == 1.0
+    assert (near.widened(0.25).lower, near.widened(0.25).upper) == (0.75, 1.25)
+    deep = Distance(-3.0, -1.0, p, q, p, estimate=-2.5)
+    assert (deep.value, deep.depth, deep.uncertainty) == (-2.5, 2.5, 1.5)
+    assert (replace(deep, estimate=None).depth, near.depth, replace(far, lower=-1.0).of_overlap().lower) == (
+        1.0,
+        0.0,
+        -math.inf,
+    )
+    assert near.of_overlap() is near
+    assert (deep.direction is p, near.direction) == (True, None)

@@ -1,15 +1,19 @@
 """Two solids from CAD by Open CASCADE: the bounds of an interference hold what a formula says."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 from clamp3d.engine.exact import _depth_bounds, exact_overlap, exact_probe
+from clamp3d.engine.judge import kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
 from clamp3d.files import cad_process
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
+from tests.cad import ball
 from tests.public.placed_pairs import placed_pair
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -68,3 +72,11 @@ def test_a_common_part_beside_the_solids_widens_the_bounds(monkeypatch):
     distance = exact_overlap(a, b, np.eye(4), 0.04)
     assert distance.lower <= -400.0  # nothing is known of it
     assert distance.upper >= 0.0
+
+
+@pytest.mark.parametrize(("off", "verdict"), [(0.006, "duplicate"), (0.015, "contained")])
+def test_solids_from_cad_that_all_but_fill_each_other(off, verdict):
+    """Two balls about one point: of the larger one a skin of ``off`` mm is outside the other, coarse meshes or not."""
+    made = [model_of(BrepSolid.of(ball(radius), "ball"), Counters()) for radius in (5.0, 5.0 + off)]
+    for a, b in itertools.permutations(made):
+        assert kind_of_overlap(a, b, np.eye(4), 0.01).value == verdict

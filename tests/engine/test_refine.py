@@ -1,0 +1,105 @@
+"""How answers of several levels and of several bodies become one: agreement, order, and what counts as known."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from clamp3d import Distance, shapes
+from clamp3d.engine import exact, refine
+from clamp3d.engine.closed_form import ClosedForm, bodies_distance
+from clamp3d.engine.hull import hull
+from clamp3d.engine.model import ModelCache
+from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import rotation, translation
+
+CUBE = ModelCache().model(shapes.box((2.0, 2.0, 2.0)))
+
+
+@pytest.mark.parametrize("off", [5e-7, -5e-7, 1.1e-6, -1.1e-6, 1.0])
+def test_levels_that_contradict_each_other_by_more_than_rounding_give_no_answer(off):
+    """Two cubes are 3 mm apart; what was said of them before is ``off`` from that."""
+    said = Distance(3.0 + off, 3.0 + off, level="boxes", method="a wrong one")
+    if abs(off) < 1e-6:
+        found = refine.refine(CUBE, CUBE, translation(5.0, 0.0, 0.0), said, lambda d: d.level == "features")
+        assert found.lower <= found.upper
+        assert (found.lower, found.upper) == pytest.approx((min(3.0, 3.0 + off), max(3.0, 3.0 + off)), abs=1e-12)
+        return
+    with pytest.raises(SolverError, match=r"boxes \(a wrong one\) disagree"):
+        refine.refine(CUBE, CUBE, translation(5.0, 0.0, 0.0), said, lambda _: False)
+
+
+def some_bodies(rng):
+    """Boxes (low, high) as bodies with errors of up to 1 mm."""
+    for middle in rng.normal(size=(rng.integers(1, 5), 3)) * 4.0:
+        corners = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+        box = hull(middle + corners * rng.uniform(0.2, 3.0, 3))
+        yield ClosedForm((box,), error=float(rng.choice([0.0, rng.uniform(0.0, 1.0)])))
+
+
+def test_the_nearest_two_of_many_bodies_are_those_of_all_pairs():
+    rng, overlaps = np.random.default_rng(7), 0
+    for _ in range(40):
+        a, b = tuple(some_bodies(rng)), tuple(some_bodies(rng))
+        T = rotation(rng.normal(size=3), 1.0)
+        T[:3, 3] = rng.normal(size=3) * 8.0
+        found = refine._by_closed_forms(a, b, T, lambda _: False)
+        every = [bodies_distance(x, y, T, lambda _: False) for x in a for y in b]
+        lower, upper = min(d.lower for d in every), min(d.upper for d in every)
+        if len(every) > 1 and lower < -1e-6:  # of pieces that overlap together the depth is not known
+            lower, overlaps = -math.inf, overlaps + 1
+        assert (found.lower, found.upper) == (pytest.approx(lower, abs=1e-9), pytest.approx(upper, abs=1e-9))
+    assert 2 < overlaps < 20
+
+
+def test_what_counts_as_known():
+    cad, small, large = (SimpleNamespace(exact=e, bounds=np.array(x)) for e, x in ((1, 1.0), (None, 1.0), (None, -5e4)))
+    assert refine.accuracy_for(cad, cad) == pytest.approx(2.1e-6)
+    assert refine.accuracy_for(cad, cad, 1e-3) == refine.accuracy_for(cad, small, 1e-3) == 1e-3
+    assert refine.accuracy_for(cad, small) == refine.accuracy_for(small, small) == 1e-7
+    assert refine.accuracy_for(small, large) == refine.accuracy_for(large, small) == pytest.approx(5e-6)
+    for lower, upper, known in ((1.0, 1.0 + 0.9e-7, True), (1.0, 1.0 + 2e-7, False), (-9.0, -1e-5, True)):
+        assert refine.measured(Distance(lower, upper)) == known
+    assert not refine.measured(Distance(-9.0, 0.0))
+    p, q, n = np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0 + 1e-5]), np.eye(3)[0]
+    near = Distance(1e-5, 1e-5, p, q, n, True)
+    assert refine.with_normal(near).normal == pytest.approx([0.0, 0.0, 1.0])
+    assert refine.with_normal(near).unique
+    assert refine.with_normal(replace(near, lower=0.0)).unique is None
+    for other in (replace(near, point_b=None), replace(near, lower=-2.0, upper=-1.0), replace(near, point_b=p)):
+        assert refine.with_normal(other).normal is n
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
+    """A common part that was found quickly is not asked for as coarsely again, nor are meshes that were measured."""
+
+    def overlap(a, b, T, share, *, quick=False, in_both):
+        return Distance(-1.0 if quick and found else -math.inf, method=f"{share} {quick} {in_both}")
+
+    monkeypatch.setattr(refine, "meshes_distance", lambda a, b, T, c, *_, **k: Distance(method=f"{c} {[*k]}"))
+    monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
+    monkeypatch.setattr(exact, "exact_probe", lambda *_: exact.Probe(Distance(method="probe"), 5))
+    monkeypatch.setattr(exact, "exact_overlap", overlap)
+    last, finest = "0.0025 ['thorough']", "0.0006 ['thorough']"
+    for first, second, fine, end in (((0.1, 0.0025), (0.1, 0.01), ["0.01 []", "0.0025 []"], [last, finest]),
+                                     ((0.1, 0.0025), (0.1, 0.0025), ["0.0025 []"], [finest]),
+                                     ((), (), [], [last, finest])):  # fmt: skip
+        a, b = (SimpleNamespace(exact=1, closed=True, chords=chords, refines=True) for chords in (first, second))
+        order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
+        assert order[: -len(end)] == [*["0.1 []"] * bool(first), "distance", "probe", "0.04 True 5", *fine,
+                                      *["0.04 False 5"] * (not found), "0.015 False 5", "0.004 False 5"]  # fmt: skip
+        assert order[-len(end) :] == end
+
+
+def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
+    for a, b, chords in (
+        ((0.1, 0.02), (0.05, 0.01), [0.05, 0.02, 0.01]),
+        ((0.1,), (0.1, 0.02), [0.1, 0.02]),
+        ((0.1,), (0.05,), [0.1]),
+        ((), (0.1, 0.02), []),
+    ):
+        first, second = (SimpleNamespace(chords=c, refines=len(c) > 1) for c in (a, b))
+        assert refine._chords(first, second) == refine._chords(second, first) == chords
