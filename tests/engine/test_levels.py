@@ -276,8 +276,9 @@ def test_a_cylinder_on_facets(i, radius, length, T):
         assert mesh.distance(found.point_a[None])[0] <= 1e-6
         assert body(rod).field(to_target(inverse(T), found.point_b[None]))[0] <= 1e-6
         assert np.linalg.norm(found.point_b - found.point_a) <= found.upper + 1e-9
-    if found.upper < -1e-6:
-        assert found.upper >= -depths(mesh, MODELS.model(rod).outer(0.001), T, 6000) - 0.05 * radius - 0.1
+    if found.upper < -1e-6:  # samples miss the deepest point of an edge: its own point attests it
+        assert mesh.distance(found.point_a[None])[0] <= 1e-6 or mesh.contains(found.point_a[None])[0]
+        assert body(rod).field(to_target(inverse(T), found.point_a[None]))[0] <= found.upper + 1e-6
 
 
 # --- Depth ------------------------------------------------------------------------------------------------------------
