@@ -170,7 +170,7 @@ def test_moved_parts_are_named_in_the_papers_words():
         assert overlap(c) == (f"{c.a} overlaps {c.b} by {sure}{-c.gap:.4g} mm" if c.gap < -1e-6 else "")
 
 
-@pytest.mark.parametrize("part", ["P1", "P2", "P3", "P5"])
+@pytest.mark.parametrize("part", ["P1", "P2", "P3", "P5", "P6"])
 def test_surfaces_at_a_point_are_those_that_sampling_finds_nearest(part):
     """Points along each outline; the ends of a body are planes. On an arc's end it is a lip."""
     solid, rng, T, rows = parts(load_clamp())[part], np.random.default_rng(8), SectionPose(7.0, -9.0, 0.3).T(), []

@@ -16,6 +16,9 @@ def test_wrong_values_in_python_are_one_line_too():
         Wire(diameter=-3.0)
     with pytest.raises(InputError, match=r"^Wire: diamter is not a known key; did you mean diameter\?$"):
         Wire(diamter=3.0)
+    wide = r"^Clamp: line: the diameter must be less than twice up_splint\.width = 137 mm, got 300; are both in mm\?$"
+    with pytest.raises(InputError, match=wide):
+        replace(load_clamp(), line=Wire(diameter=300.0))
 
 
 def _changed(thing, path, value):
