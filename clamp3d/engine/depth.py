@@ -18,6 +18,7 @@ from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.refine import SHARES
 from clamp3d.engine.surface import Surface
+from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array
 
 _DIRECTIONS = 4
@@ -85,7 +86,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     unknown = replace(distance, lower=-np.inf, interference=interference)
     if not (a.chords and b.chords):
         return unknown
-    outer_a, outer_b = (model.outer(_depth_chord(model, fine)) for model in (a, b))
+    outer_a, outer_b = (_depth_mesh(model, fine) for model in (a, b))
     shared = common(outer_a, outer_b, T)
     if shared is None:
         return unknown
@@ -115,10 +116,13 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     )
 
 
-def _depth_chord(model: Model, fine: bool) -> float:
-    """Chord error (mm) of the mesh that the depth of a part is measured on."""
+def _depth_mesh(model: Model, fine: bool) -> Surface:
+    """The mesh that the depth of a part is measured on: the coarse one where a finer one takes too long to make."""
     finest = model.chords[min(1, len(model.chords) - 1)]
-    return finest if fine or model.exact is None else max(finest, QUICK_CHORD)
+    try:
+        return model.outer(finest if fine or model.exact is None else max(finest, QUICK_CHORD))
+    except Clamp3dError:
+        return model.outer(model.chords[0])
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:

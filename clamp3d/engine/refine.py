@@ -18,7 +18,7 @@ from clamp3d.engine.facets import rod_of, rods_distance
 from clamp3d.engine.mesh_distance import meshes_distance
 from clamp3d.engine.model import LAST_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
-from clamp3d.errors import SolverError
+from clamp3d.errors import Clamp3dError, SolverError
 from clamp3d.files.pairs import TOLERANCE
 from clamp3d.geometry.pose import Array, inverse
 
@@ -93,13 +93,24 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tup
     quick = exact_overlap(a, b, T, SHARES[0], quick=True, in_both=probe.in_both)
     yield "exact", quick
     for chord in chords[1:]:
-        yield "meshes", meshes_distance(a, b, T, chord, enough)
+        yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
     for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
-        yield "exact", exact_overlap(a, b, T, share, in_both=probe.in_both)
+        overlap = exact_overlap(a, b, T, share, in_both=probe.in_both)
+        yield "exact", overlap
+        if np.isinf(overlap.lower):  # finer ones take longer
+            break
     measured = max(a.chords[-1], b.chords[-1]) if chords else np.inf
     for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
         if chord < measured:
-            yield "meshes", meshes_distance(a, b, T, chord, enough, thorough=True)
+            yield "meshes", _by_fine_meshes(a, b, T, chord, enough, thorough=True)
+
+
+def _by_fine_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:
+    """What fine meshes say of two solids from CAD; nothing where they take too long to make."""
+    try:
+        return meshes_distance(a, b, T, chord, enough, thorough=thorough)
+    except Clamp3dError:
+        return Distance(level="meshes", method="without fine meshes")
 
 
 def _is_round(model: Model) -> bool:

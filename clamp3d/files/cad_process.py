@@ -14,6 +14,8 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _PATIENCE = 10.0
 """Seconds in which a process of a busy machine gets one second of processor time."""
+_FINE_SECONDS = 20.0
+"""Time limit of triangles that are finer than usual: of splines they can take minutes, and others may decide."""
 _QUICK_SECONDS, _COMMON_SECONDS = 1.0, 5.0
 """Time limits of a common part, which Open CASCADE does not always find between round faces that all but coincide.
 
@@ -38,6 +40,7 @@ def _there(function: Callable[_P, _R], seconds: float = 300.0) -> Callable[_P, _
 
 
 tessellate = _there(tessellation.tessellate)
+tessellate_finely = _there(tessellation.tessellate, _FINE_SECONDS)
 surfaces = _there(faces.surfaces)
 bounds_at = _there(open_cascade.bounds_at)
 distance = _there(pairs.distance)

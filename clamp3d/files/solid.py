@@ -79,7 +79,8 @@ class BrepSolid(MeshShape):
     def tessellated(self, chord: float) -> Tessellation:
         """Triangles within about ``chord`` mm of its faces. Raises Clamp3dError if a face gets none."""
         if chord not in self._tessellations:
-            self._tessellations[chord] = cad_process.tessellate(self.brep, chord)
+            make = cad_process.tessellate if chord >= CHORD else cad_process.tessellate_finely
+            self._tessellations[chord] = make(self.brep, chord)
         return self._tessellations[chord]
 
     @cached_property

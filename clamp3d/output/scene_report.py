@@ -55,6 +55,8 @@ def check_to_text(
     if comparison is not None:
         lines += comparison_text(comparison)
     lines += _cut(_findings(result, comparison, accepted or {}), _LISTED, "more (--json or --html lists all)")
+    others = {*(accepted or {})} - {group.id for group in grouped(result)}
+    lines += [f"  note: accepted, and no finding now: {', '.join(sorted(others))}"] if others else []
     if result.pairs:
         rows = [
             (f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance), row.distance.method)

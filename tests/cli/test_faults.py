@@ -141,6 +141,26 @@ def _alive(pid):
     return found.stdout.strip() not in ("", "Z", "Zs")
 
 
+@posix
+def test_an_interrupt_ends_the_program_also_while_a_library_that_ignores_it_is_imported(tmp_path):
+    (tmp_path / "stubborn.py").write_text(
+        "import time\nprint('here', flush=True)\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    pass\n"
+    )
+    code = "from clamp3d.cli.terminal import end_on_signals; end_on_signals(); import stubborn; print('went on')"
+    path = os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=ENVIRONMENT | {"PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as process:
+        assert process.stdout.readline() == b"here\n"
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60) == (b"", b"clamp3d: interrupted\n")
+    assert process.returncode == 130
+
+
 def test_no_file_is_written_over_what_is_read_or_over_another(tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
     for name, x in (("a", 0.0), ("b", 5.0)):

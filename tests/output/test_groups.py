@@ -183,6 +183,9 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     code, out, _ = main("check", "boxes.toml")
     assert code == 0
     assert out.count("accepted by Ada on 20") == 2
+    assert "no finding now" not in out
+    main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen")
+    assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
     boxes(a=0, b=9, c=8)
     assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
 
