@@ -77,9 +77,12 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     """A common part that was found quickly is not asked for as coarsely again, nor are meshes that were measured."""
 
     def overlap(a, b, T, share, *, quick=False, in_both):
-        return Distance(-1.0 if quick and found else -math.inf, method=f"{share} {quick} {in_both}")
+        return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick} {in_both}")
 
-    monkeypatch.setattr(refine, "meshes_distance", lambda a, b, T, c, *_, **k: Distance(method=f"{c} {[*k]}"))
+    def meshes(a, b, T, chord, enough, *, thorough=False):
+        return Distance(method=f"{chord} {['thorough'] * thorough}")
+
+    monkeypatch.setattr(refine, "meshes_distance", meshes)
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(exact, "exact_probe", lambda *_: exact.Probe(Distance(method="probe"), 5))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
@@ -92,6 +95,21 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
         assert order[: -len(end)] == [*["0.1 []"] * bool(first), "distance", "probe", "0.04 True 5", *fine,
                                       *["0.04 False 5"] * (not found), "0.015 False 5", "0.004 False 5"]  # fmt: skip
         assert order[-len(end) :] == end
+
+
+def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshes_that_fail_say_nothing(monkeypatch):
+    def fails(*_, **__):
+        raise SolverError("no answer in 20 s")
+
+    monkeypatch.setattr(refine, "meshes_distance", fails)
+    monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
+    monkeypatch.setattr(exact, "exact_probe", lambda *_: exact.Probe(Distance(method="probe"), 5))
+    monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
+    a = SimpleNamespace(exact=1, closed=True, chords=(), refines=True)
+    answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
+    assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
+    assert len(answers) == 6
+    assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[4:])
 
 
 def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
