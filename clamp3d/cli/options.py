@@ -137,7 +137,7 @@ def command(name: str) -> Callable[[type[Any]], click.Command]:
 
 def _keep_apart(parameters: Mapping[str, click.Parameter], values: Mapping[str, Any]) -> None:
     """Refuse that a file is written over another one, or over what the command reads."""
-    from clamp3d.output.files import STDOUT, check_writable, keep
+    from clamp3d.output.files import STDOUT, keep, require_not_kept
 
     arguments = [values[name] for name, p in parameters.items() if isinstance(p, click.Argument) and p.nargs == 1]
     read = [Path(value) for value in arguments if value and os.path.exists(value)]
@@ -145,7 +145,7 @@ def _keep_apart(parameters: Mapping[str, click.Parameter], values: Mapping[str, 
     written: dict[str, str] = {}
     for name, parameter in parameters.items():
         if isinstance(parameter.type, Output) and values[name] not in (None, STDOUT):
-            check_writable(values[name])
+            require_not_kept(values[name])
             other = written.setdefault(os.path.realpath(values[name]), parameter.opts[0])
             if other != parameter.opts[0]:
                 raise click.UsageError(f"{other} and {parameter.opts[0]} are one file: {values[name]}")

@@ -14,8 +14,9 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
-from clamp3d.engine.overlap import arrays_of, common, deepest, thickness
+from clamp3d.engine.overlap import common, deepest, thickness
 from clamp3d.engine.surface import Surface, fcl_pair
+from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
 Enough = Callable[[Distance], bool]

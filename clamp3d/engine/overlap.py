@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.engine.surface import Surface
+from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.shells import volume
 from clamp3d.geometry.triangles import closest_points
@@ -85,12 +86,6 @@ def common(a: Surface, b: Surface, T: Array) -> Common | None:
     intersection = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
     vertices, faces = arrays_of(intersection)
     return Common(vertices, faces) if len(faces) else None
-
-
-def arrays_of(manifold: Any) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices (n, 3) and faces (m, 3) of a mesh of manifold3d."""
-    mesh = manifold.to_mesh64()
-    return np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
 
 
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.engine.hull import hull_error
+from clamp3d.geometry.manifolds import as_manifold
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shells import shells, winding_numbers
@@ -76,13 +77,7 @@ class Surface:
     @cached_property
     def manifold(self) -> Any:
         """The same mesh for booleans."""
-        import manifold3d
-
-        return manifold3d.Manifold(
-            manifold3d.Mesh64(
-                vert_properties=self.vertices, tri_verts=np.ascontiguousarray(self.faces, dtype=np.uint64)
-            )
-        )
+        return as_manifold(self.vertices, self.faces)
 
     @cached_property
     def shell_points(self) -> Array:

@@ -104,10 +104,10 @@ def _announced_obj(raw: bytes) -> int:
 
 
 def _announced_ply(raw: bytes) -> int:
-    header, _, data = raw.partition(b"end_header")
-    counts = {name: int(number) for name, number in re.findall(rb"element\s+(\w+)\s+(\d+)", header[:100_000])}
-    if b"ascii" in header[:100]:
-        _lines(data, sum(counts.values()))
+    end = max(0, raw.find(b"end_header", 0, 100_000))
+    counts = {name: int(number) for name, number in re.findall(rb"element\s+(\w+)\s+(\d+)", raw[:end])}
+    if b"ascii" in raw[: min(end, 100)]:
+        _lines(raw[end + len(b"end_header") :], sum(counts.values()))
     return counts.get(b"face", 0)
 
 

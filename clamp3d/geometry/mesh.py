@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clamp3d import checks
 from clamp3d.errors import InputError
+from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.shells import inside_out, joined, shells, volume, winding_numbers
 
 Array = NDArray[np.float64]
@@ -180,14 +181,6 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
         return V, F
     import manifold3d
 
-    def as_manifold(vertices: Array, faces: IntArray) -> Any:
-        vertices = np.ascontiguousarray(vertices)
-        return manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
-
-    def arrays(manifold: Any) -> tuple[Array, IntArray]:
-        mesh = manifold.to_mesh64()
-        return np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
-
     surfaces = [as_manifold(*_used(V, F[rows])) for rows in connected]
     if pinched:  # only then, since it takes long for many bodies
         surfaces = [part for surface in surfaces for part in surface.decompose()]
@@ -196,15 +189,15 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
     if len(solids) < 2 or any(surface.is_empty() for surface in surfaces):
         return V, F
     bodies = [*solids]
-    for corners, triangles in map(arrays, surfaces[: -len(solids)]):  # cavities, each of the smallest solid round it
-        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays(solid), corners[:1])[0] > 0.5)
+    for corners, triangles in map(arrays_of, surfaces[: -len(solids)]):  # cavities, each of the smallest solid round it
+        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), corners[:1])[0] > 0.5)
         k = next(around, -1)
         bodies[k] -= as_manifold(corners, triangles[:, ::-1])
     whole = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
     if whole.num_tri() == len(F) and np.isclose(whole.volume(), volume(V, F), rtol=1e-9):
         return V, F
     notes.append(f"{len(solids)} bodies in the mesh, some of which overlap or touch: taken as one")
-    return arrays(whole)
+    return arrays_of(whole)
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Mesh:
@@ -346,8 +339,7 @@ def _closure(V: Array, F: IntArray) -> tuple[bool, str]:
             return True, ""
         import manifold3d
 
-        raw = manifold3d.Mesh64(vert_properties=np.ascontiguousarray(V), tri_verts=F.astype(np.uint64))
-        if manifold3d.Manifold(raw).status() == manifold3d.Error.NoError:
+        if as_manifold(V, F).status() == manifold3d.Error.NoError:
             return True, f"{crossed} edges with more than two triangles: taken as bodies that touch there"
     return False, (
         f"not closed: {rim} edges with one triangle, {crossed} with more than two, "

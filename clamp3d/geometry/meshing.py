@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from clamp3d.checks import instance
 from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.extrusion import Extrusion
+from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import Profile, Side, check_mesh_error
 from clamp3d.geometry.shapes import Solid
@@ -61,7 +62,7 @@ def mesh(part: Solid, mesh_error: float = 0.01) -> trimesh.Trimesh:
 
     mesh_error = check_mesh_error(mesh_error)
     instance("part", part, Solid)
-    V, F = _arrays(_solid(part, mesh_error, "chords"))
+    V, F = arrays_of(_solid(part, mesh_error, "chords"))
     out = trimesh.Trimesh(
         vertices=V,
         faces=F,
@@ -87,12 +88,7 @@ def enclosing(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]]
 
 def _one_sided(part: Solid, mesh_error: float, side: Side) -> tuple[Array, NDArray[np.int64]] | None:
     solid = _solid(part, mesh_error, side)
-    return None if solid.is_empty() else _arrays(solid)
-
-
-def _arrays(solid: Any) -> tuple[Array, NDArray[np.int64]]:
-    raw = solid.to_mesh64()
-    return np.array(raw.vert_properties, dtype=np.float64)[:, :3], np.array(raw.tri_verts, dtype=np.int64)
+    return None if solid.is_empty() else arrays_of(solid)
 
 
 def chord_error(part: Solid, mesh_error: float) -> float:
@@ -152,9 +148,9 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
         second = np.concatenate([np.roll(part, -1) for part in np.split(first, starts)])
         sides = [np.stack([first, second, second + n], axis=1), np.stack([first, second + n, first + n], axis=1)]
         points = np.concatenate([np.column_stack([corners, np.full(n, end)]) for end in ends])
-        faces = np.concatenate([caps[:, ::-1], caps + n, *sides]).astype(np.uint64)
+        faces = np.concatenate([caps[:, ::-1], caps + n, *sides])
         # Not by trimesh: it takes 0.4 s to import, merges vertices, and its booleans round them to single precision.
-        solid += manifold3d.Manifold(manifold3d.Mesh64(vert_properties=points @ shape.frame.T, tri_verts=faces))
+        solid += as_manifold(points @ shape.frame.T, faces)
     return solid
 
 

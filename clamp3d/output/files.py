@@ -28,7 +28,8 @@ def keep(files: Iterable[Path]) -> None:
     _KEPT.update(Path(os.path.realpath(file)) for file in files)
 
 
-def _require_not_kept(path: Path) -> None:
+def require_not_kept(path: Path) -> None:
+    """Raise InputError if a file is one of those that are kept: to be called before long work."""
     if Path(os.path.realpath(path)) in _KEPT:
         raise InputError(f"cannot write {short(path)}: it is the input")
 
@@ -41,7 +42,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to,
     or the disk is full.
     """
-    _require_not_kept(path)
+    require_not_kept(path)
     target = Path(os.path.realpath(path))
     special = path == STDOUT or (target.exists() and not target.is_file() and not target.is_dir())
     with ExitStack() as stack:
@@ -75,7 +76,6 @@ def check_writable(path: Path) -> None:
     """Raise InputError if a file ``path`` cannot be written: to be called before long work."""
     if path.is_dir():
         raise InputError(f"cannot write {short(path)}: it is a folder")
-    _require_not_kept(path)
     if path != STDOUT and (not path.exists() or path.is_file()):
         _probe(Path(os.path.realpath(path)).parent, f"cannot write {short(path)}")
 

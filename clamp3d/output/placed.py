@@ -14,6 +14,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.engine.scene import Scene, unknown_part
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Component
+from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape, Shape
@@ -76,18 +77,9 @@ def posed(parts: Iterable[PlacedPart], mesh_error: float) -> list[PosedMesh]:
 
 def overlap(a: PosedMesh, b: PosedMesh) -> trimesh.Trimesh | None:
     """What two parts share, in the world, by manifold3d; None where their facets do not meet."""
-    import manifold3d
-
-    # Not by trimesh, whose booleans round to single precision.
-    first, second = (
-        manifold3d.Manifold(manifold3d.Mesh64(item.world, np.array(item.mesh.faces, np.uint64, order="C")))
-        for item in (a, b)
-    )
-    shared = (first ^ second).to_mesh64()
-    if not len(shared.tri_verts):
-        return None
-    vertices, faces = np.asarray(shared.vert_properties)[:, :3], np.asarray(shared.tri_verts, np.int64)
-    return trimesh.Trimesh(vertices, faces, process=False)
+    first, second = (as_manifold(item.world, item.mesh.faces) for item in (a, b))
+    vertices, faces = arrays_of(first ^ second)
+    return trimesh.Trimesh(vertices, faces, process=False) if len(faces) else None
 
 
 def _triangles(shape: Shape, mesh_error: float) -> trimesh.Trimesh:
