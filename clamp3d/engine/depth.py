@@ -19,7 +19,7 @@ from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.refine import SHARES
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_target
 
 _DIRECTIONS = 4
 """Flat sides of the overlap along which the bodies are moved apart."""
@@ -125,13 +125,17 @@ def _depth_mesh(model: Model, fine: bool) -> Surface:
         return model.outer(model.chords[0])
 
 
-def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array | None]:
-    """Length (mm), infinite if unknown, and direction (3,) of a translation of ``b`` after which meshes are apart."""
-    best, way = np.inf, None
-    slack = 2.0 * (a.error + b.error + rounding_of(a, b, T))
+def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array]:
+    """Length (mm) and direction (3,) of a translation of ``b`` after which meshes are apart."""
+    off = a.error + b.error + rounding_of(a, b, T)
+    slack = 2.0 * off
     # Where two faces hold a body, as a V does, its way out is between their normals.
     candidates = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
-    for direction in np.repeat(candidates, 2, axis=0) * np.tile([[1.0], [-1.0]], (len(candidates), 1)):
+    directions = np.repeat(candidates, 2, axis=0) * np.tile([[1.0], [-1.0]], (len(candidates), 1))
+    # A plane parts them after this length at the latest.
+    extents = (a.vertices @ directions.T).max(axis=0) - (to_target(T, b.vertices) @ directions.T).min(axis=0) + off
+    best, way = float(extents.min()), directions[extents.argmin()]
+    for direction in directions:
         if best <= _CLOSE * depth + slack:
             break
         reach = float(np.ptp(shared.vertices @ direction)) + slack

@@ -37,7 +37,10 @@ def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough, 
     """
     chord_error = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
     distance = _between_meshes(a, b, T, error, enough, thorough=thorough)
-    return replace(distance, method=f"meshes (FCL){chord_error}")
+    crossing = [m.name for m in (a, b) if m.outer(error).crosses_itself] if distance.upper < 0.0 else []
+    return replace(
+        distance, method=f"meshes (FCL){chord_error}{''.join(f', {name} crosses itself' for name in crossing)}"
+    )
 
 
 def _between_meshes(a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool) -> Distance:
@@ -155,6 +158,8 @@ def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer`` or within ``slack`` mm of it."""
     points = to_target(T, inner.vertices)
     if (points < outer.box[0] - slack).any() or (points > outer.box[1] + slack).any():
+        return False
+    if inner.crosses_itself or outer.crosses_itself:  # what booleans leave of them says nothing
         return False
     if not outer.contains(points[outer.distance(points) > slack]).all():
         return False

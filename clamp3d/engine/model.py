@@ -272,7 +272,7 @@ class MeshModel(Model):
         if not self.closed:
             return None
         mesh = self.outer(DRAWN_CHORDS[0])
-        if self._fit is None or not self._fit.features:
+        if self._fit is None or not self._fit.features or mesh.crosses_itself:
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
 
@@ -296,7 +296,7 @@ class MeshModel(Model):
         for k, feature in enumerate(self._fit.features if self._fit is not None else ()):
             error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
             patch[feature.faces] = k + 1
-        return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error)
+        return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error, given=True)
 
 
 def model_of(shape: Shape, counters: Counters) -> Model:

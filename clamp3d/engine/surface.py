@@ -30,11 +30,13 @@ class Surface:
 
     ``face_error`` (m,) mm: every point of the true surface is within this of a triangle, and the other way round;
     None where the mesh is the part, or holds it, or is held by it.
+    ``given``: whether the triangles are somebody's, which may cross each other.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
     face_error: Array | None = None
+    given: bool = False
 
     def __post_init__(self) -> None:
         self.vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
@@ -121,7 +123,8 @@ class Surface:
         """Which of the points (k, 3), none of them on the surface, lie inside.
 
         Nothing of the surface lies between a point and the triangle nearest to it, so where the nearest point is in the
-        middle of a triangle its normal says the side. For other points, and of open surfaces, winding numbers do.
+        middle of a triangle its normal says the side. For other points, and of surfaces that are open or cross
+        themselves, winding numbers do.
         """
         inside = ((points > self.box[0]) & (points < self.box[1])).all(axis=1)
         rows = np.flatnonzero(inside)
@@ -144,12 +147,22 @@ class Surface:
         inward = np.cross(normal[:, None], sides)
         margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
         away = np.einsum("ki,ki->k", points - foot, normal)
-        is_certain = self._is_closed & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
+        is_certain = self._has_sides & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
         return away < 0.0, np.asarray(is_certain)
 
     @cached_property
-    def _is_closed(self) -> bool:
-        return is_closed(self.faces)
+    def crosses_itself(self) -> bool:
+        """Whether given triangles of a closed mesh cross each other: then some of them are walls inside the part."""
+        if not (self.given and is_closed(self.faces)):
+            return False
+        import igl.predicates
+
+        return bool(igl.predicates.find_self_intersections(self.vertices, self.faces, True)[0])
+
+    @cached_property
+    def _has_sides(self) -> bool:
+        """Whether each triangle has the part on one side, and what is outside on the other."""
+        return is_closed(self.faces) and not self.crosses_itself
 
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""

@@ -1,5 +1,7 @@
 """Meshes of several bodies that overlap or touch: what they make together is the part, without walls inside of it."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import trimesh
@@ -53,3 +55,53 @@ def test_bodies_of_one_mesh_are_one_part(second, hollow, turned):
         if truth > 0.0:
             low, high = result.pairs[0].where.volume
             assert low <= truth <= high <= truth + 1e-6
+
+
+LOOP = np.array([[0, 0], [60, 0], [60, 40], [20, 40], [20, -40]], dtype=float)
+HALF = 8.0
+
+
+def loop():
+    """A square tube swept along `LOOP`, as one surface that crosses itself, and the boxes (2, 3) that it is made of."""
+    way = np.diff(LOOP, axis=0) / np.linalg.norm(np.diff(LOOP, axis=0), axis=1)[:, None]
+    aside = np.column_stack([-way[:, 1], way[:, 0]])
+    mitre = HALF * np.vstack([aside[:1], aside[:-1] + aside[1:], aside[-1:]])
+    rings = [[[*(p + s * m), z * HALF] for s, z in ((-1, 1), (1, 1), (1, -1), (-1, -1))] for p, m in zip(LOOP, mitre)]
+    faces = [[0, 2, 1], [0, 3, 2], [16, 17, 18], [16, 18, 19]]
+    for a, b in ((4 * k + j, 4 * k + (j + 1) % 4) for k in range(4) for j in range(4)):
+        faces += [[a, b, b + 4], [a, b + 4, a + 4]]
+    tube = trimesh.Trimesh(np.vstack(rings), faces, process=False)
+    ends = [np.array([LOOP[k] - HALF * (k > 0) * way[k], LOOP[k + 1] + HALF * (k < 3) * way[k]]) for k in range(4)]
+    flat = [np.array([e.min(axis=0) - HALF * np.abs(a), e.max(axis=0) + HALF * np.abs(a)]) for e, a in zip(ends, aside)]
+    boxes = [np.column_stack([box, [-HALF, HALF]]) for box in flat]
+    tube.invert() if tube.volume < 0.0 else None
+    assert tube.is_watertight
+    return MeshShape(make_mesh(tube.vertices, tube.faces), "off"), boxes
+
+
+def union(place, boxes):
+    """Volume of what boxes (2, 3) cover of another, by inclusion and exclusion."""
+    subsets = (some for n in range(1, len(boxes) + 1) for some in combinations(boxes, n))
+    return sum((-1) ** (len(some) + 1) * shared(place, *some) for some in subsets)
+
+
+@pytest.mark.parametrize("form", ["mesh", "drawn"])
+def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
+    part, boxes = loop()
+    cube = box_mesh([[-0.5] * 3, [0.5] * 3])
+    probe = shapes.box((1, 1, 1)) if form == "drawn" else MeshShape(make_mesh(cube.vertices, cube.faces), "off")
+    rng = np.random.default_rng(3)
+    for centre in [(31, 0, 0), (20, 6, 0), (20, 7, 3), (20, 0, 0), *rng.uniform([10, -15, -8.4], [35, 15, 8.4], (40, 3))]:
+        place = np.array([-0.5, 0.5])[:, None] + centre
+        pair = check(Scene().add("loop", part).add("probe", probe, translation(*centre))).pairs[0]
+        distance, truth = pair.distance, union(place, boxes)
+        if truth == 0.0:
+            away = [np.linalg.norm(np.maximum(0.0, np.maximum(b[0] - place[1], place[0] - b[1]))) for b in boxes]
+            assert distance.lower <= min(away) <= distance.upper <= min(away) + 1e-9
+            continue
+        assert pair.verdict.value in {"clash", "contained"}
+        assert "crosses itself" in distance.method
+        assert 0.0 < -distance.upper <= HALF + 0.5 - abs(centre[2])
+        assert union(place - distance.lower * distance.normal, boxes) < 1e-9
+        low, high = pair.where.volume
+        assert low <= truth <= high
