@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import io
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,17 @@ occ: Any = _OpenCascade()
 """`occ.gp_Pnt` and all others. Raises MissingLibraryError if Open CASCADE is not installed."""
 
 
+@cache
 def require_open_cascade() -> Any:
     """Open CASCADE, kept from printing on stdout. Raises MissingLibraryError if it is not installed."""
+    gc.disable()  # its thousands of classes are no garbage: to look for some among them takes as long as to load them
     try:
         import OCP
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
+    finally:
+        gc.enable()
+    gc.freeze()
     messenger = OCP.Message.Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
