@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 import io
+import sys
 from collections.abc import Iterator
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,20 +30,25 @@ occ: Any = _OpenCascade()
 """`occ.gp_Pnt` and all others. Raises MissingLibraryError if Open CASCADE is not installed."""
 
 
-@cache
 def require_open_cascade() -> Any:
     """Open CASCADE, kept from printing on stdout. Raises MissingLibraryError if it is not installed."""
-    gc.disable()  # its thousands of classes are no garbage: to look for some among them takes as long as to load them
     try:
-        import OCP
+        OCP = sys.modules.get("OCP") or _loaded()
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
-    finally:
-        gc.enable()
-    gc.freeze()
     messenger = OCP.Message.Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
+    return OCP
+
+
+def _loaded() -> Any:
+    gc.disable()  # its thousands of classes are no garbage: to look for some among them takes as long as to load them
+    try:
+        import OCP
+    finally:
+        gc.enable()
+    gc.freeze()
     return OCP
 
 

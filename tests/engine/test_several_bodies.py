@@ -59,6 +59,7 @@ def test_bodies_of_one_mesh_are_one_part(second, hollow, turned):
 
 LOOP = np.array([[0, 0], [60, 0], [60, 40], [20, 40], [20, -40]], dtype=float)
 HALF = 8.0
+SECTION = ((-1, HALF), (1, HALF), (1, -HALF), (-1, -HALF))
 
 
 def loop():
@@ -66,16 +67,16 @@ def loop():
     way = np.diff(LOOP, axis=0) / np.linalg.norm(np.diff(LOOP, axis=0), axis=1)[:, None]
     aside = np.column_stack([-way[:, 1], way[:, 0]])
     mitre = HALF * np.vstack([aside[:1], aside[:-1] + aside[1:], aside[-1:]])
-    rings = [[[*(p + s * m), z * HALF] for s, z in ((-1, 1), (1, 1), (1, -1), (-1, -1))] for p, m in zip(LOOP, mitre)]
+    corners = [np.column_stack([LOOP + s * mitre, np.full(5, z)]) for s, z in SECTION]
     faces = [[0, 2, 1], [0, 3, 2], [16, 17, 18], [16, 18, 19]]
     for a, b in ((4 * k + j, 4 * k + (j + 1) % 4) for k in range(4) for j in range(4)):
         faces += [[a, b, b + 4], [a, b + 4, a + 4]]
-    tube = trimesh.Trimesh(np.vstack(rings), faces, process=False)
-    ends = [np.array([LOOP[k] - HALF * (k > 0) * way[k], LOOP[k + 1] + HALF * (k < 3) * way[k]]) for k in range(4)]
-    flat = [np.array([e.min(axis=0) - HALF * np.abs(a), e.max(axis=0) + HALF * np.abs(a)]) for e, a in zip(ends, aside)]
-    boxes = [np.column_stack([box, [-HALF, HALF]]) for box in flat]
-    tube.invert() if tube.volume < 0.0 else None
-    assert tube.is_watertight
+    tube = trimesh.Trimesh(np.stack(corners, axis=1).reshape(-1, 3), faces, process=False)
+    boxes = []
+    for k in range(4):
+        ends = np.array([LOOP[k] - HALF * (k > 0) * way[k], LOOP[k + 1] + HALF * (k < 3) * way[k]])
+        wide = HALF * np.abs(aside[k])
+        boxes.append(np.column_stack([[ends.min(axis=0) - wide, ends.max(axis=0) + wide], [-HALF, HALF]]))
     return MeshShape(make_mesh(tube.vertices, tube.faces), "off"), boxes
 
 
@@ -91,7 +92,8 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
     cube = box_mesh([[-0.5] * 3, [0.5] * 3])
     probe = shapes.box((1, 1, 1)) if form == "drawn" else MeshShape(make_mesh(cube.vertices, cube.faces), "off")
     rng = np.random.default_rng(3)
-    for centre in [(31, 0, 0), (20, 6, 0), (20, 7, 3), (20, 0, 0), *rng.uniform([10, -15, -8.4], [35, 15, 8.4], (40, 3))]:
+    drawn = rng.uniform([10, -15, -8.4], [35, 15, 8.4], (40, 3))
+    for centre in [(31, 0, 0), (20, 6, 0), (20, 7, 3), (20, 0, 0), *drawn]:
         place = np.array([-0.5, 0.5])[:, None] + centre
         pair = check(Scene().add("loop", part).add("probe", probe, translation(*centre))).pairs[0]
         distance, truth = pair.distance, union(place, boxes)
