@@ -159,8 +159,6 @@ def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     points = to_target(T, inner.vertices)
     if (points < outer.box[0] - slack).any() or (points > outer.box[1] + slack).any():
         return False
-    if inner.crosses_itself or outer.crosses_itself:  # what booleans leave of them says nothing
-        return False
     if not outer.contains(points[outer.distance(points) > slack]).all():
         return False
     corners, faces = arrays_of(inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import Scene, check, shapes
+from clamp3d import Scene, Verdict, check, shapes
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.pose import translation
 from clamp3d.geometry.shapes import MeshShape
@@ -105,5 +105,15 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
         assert "crosses itself" in distance.method
         assert 0.0 < -distance.upper <= HALF + 0.5 - abs(centre[2])
         assert union(place - distance.lower * distance.normal, boxes) < 1e-9
+        assert -distance.lower <= HALF + 0.5 - abs(centre[2]) + 1e-9
         low, high = pair.where.volume
         assert low <= truth <= high
+
+
+def test_how_deep_a_bar_lies_is_not_bounded_by_walls_inside():
+    """Its middle is 8 mm from the top, and 2 mm from a wall inside."""
+    part, _ = loop()
+    scene = Scene(contact=3.0)
+    pair = check(scene.add("loop", part).add("bar", shapes.box((2, 2, 100)), translation(26, 0, 0))).pairs[0]
+    assert pair.verdict is not Verdict.CONTACT
+    assert pair.distance.interference is None or pair.distance.interference[1] >= HALF
