@@ -83,17 +83,18 @@ def _bring(plan: Plan, k: int, log: Log) -> None:
     log.touch(step.name, sorted((min(pair), max(pair)) for pair in pairs), base, travel, within=CONTACT)
 
 
-def _opened(section: Section) -> Array:
-    """The state in which the clamp comes in, the wires in the middle between the splints."""
-    return section.open_state(section.open_distance())
+def _opened(section: Section) -> tuple[Array, float]:
+    """The state in which the clamp comes in, and the height (mm) half-way between its splints' faces."""
+    opened, clamp = section.open_state(section.open_distance()), section.clamp
+    under = float(section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
+    return opened, 0.5 * (clamp.up_splint.thickness + under)
 
 
 def _approach_line(step: str, closing: Closing, log: Log) -> None:
     """The open clamp comes in from the right until the line lies under its groove, then settles on the line."""
-    section, start, opened = log.section, closing.start, _opened(log.section)
-    clamp = section.clamp
+    section, start, clamp = log.section, closing.start, log.section.clamp
+    opened, middle = _opened(section)
     beside, over, settled = opened.copy(), opened.copy(), opened.copy()
-    middle = 0.5 * (clamp.up_splint.thickness + section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
     beside[1] = over[1] = middle
     beside[0] = -clamp.line.radius - SPARE
     # The jumper waits clear of the clamp's way in.
@@ -112,7 +113,7 @@ def _approach_line(step: str, closing: Closing, log: Log) -> None:
 def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
     """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
     inside, placed = closing.start.copy(), log.section.poses(closing.start)
-    inside[3] = _opened(log.section)[3]
+    inside[3] = _opened(log.section)[1]
     log.reach(step, "jumper between the splints", log.section.poses(inside))
     log.reach(step, "jumper in the up splint's groove", placed)
     log.touch(step, [("P1", "P7")], placed, float(inside[3] - closing.start[3]))

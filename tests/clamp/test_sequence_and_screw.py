@@ -42,7 +42,7 @@ def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say():
     assert path[0]["P1"].x == pytest.approx(clamp.line.radius + 20.0)  # 20 mm of free way on either side of the splints
     free = path[0]["P1"].x + clamp.up_splint.width + clamp.jumper.radius + 20.0
     assert [poses["P7"].x for poses in path[:3]] == pytest.approx([free] * 3)
-    for poses, wire in zip(path[:3], ("P6", "P6", "P7"), strict=True):  # at half height between the faces
+    for poses, wire in zip(path[:4], ("P6", "P6", "P7", "P7"), strict=True):  # at half height between the faces
         faces = poses["P1"].y + clamp.up_splint.thickness, poses["P2"].y + clamp.down_splint.face_depth
         assert sum(faces) == pytest.approx(2.0 * poses[wire].y, abs=1e-9)
     apart = [poses["P2"].y - poses["P1"].y for poses in path]
