@@ -21,30 +21,34 @@ from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
 Enough = Callable[[Distance], bool]
 
-_CUTS, _FEW_CUTS = 100_000, 2_000
+CUTS, FEW_CUTS = 100_000, 2_000
 """Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much
-less where Open CASCADE can be asked instead.
+less where Open CASCADE can be asked next.
 """
 _HALVINGS = 30
 """Halvings of the way between two nearest points after which the true surface on it is known to rounding."""
 
 
-def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool = False) -> Distance:
+def meshes_distance(
+    a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool = False, cuts: int = CUTS
+) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
 
     In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other. It
     is bounded from above only where that can be ``enough``. ``thorough``: also where a solid's mesh is large then.
+    ``cuts``: triangles that those of an overlap are cut into beyond their number, to bound its thickness.
     """
     chord_error = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
-    distance = _between_meshes(a, b, T, error, enough, thorough=thorough)
+    distance = _between_meshes(a, b, T, error, enough, thorough=thorough, cuts=cuts)
     crossing = [m.name for m in (a, b) if m.outer(error).crosses_itself] if distance.upper < 0.0 else []
     return replace(
         distance, method=f"meshes (FCL){chord_error}{''.join(f', {name} crosses itself' for name in crossing)}"
     )
 
 
-def _between_meshes(a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool) -> Distance:
-    cuts = _CUTS if a.exact is None or b.exact is None else _FEW_CUTS
+def _between_meshes(
+    a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool, cuts: int
+) -> Distance:
     outer_a, outer_b = (model.outer(error, thorough=thorough) for model in (a, b))
     outer = surface_distance(outer_a, outer_b, T, enough, cuts)
     if not (a.bracketed or b.bracketed):
@@ -77,7 +81,7 @@ def _towards(model: Model, T: Array, inside: Array, outside: Array) -> Array:
     return np.asarray(inside + low * (outside - inside))
 
 
-def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int = _CUTS) -> Distance:
+def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int = CUTS) -> Distance:
     """Signed distance of two meshes, ``b`` at ``T`` (4, 4) in a's frame; answers as `meshes_distance`."""
     rounding = rounding_of(a, b, T)
     if not surfaces_meet(a, b, T):

@@ -15,7 +15,7 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
-from clamp3d.engine.mesh_distance import meshes_distance
+from clamp3d.engine.mesh_distance import FEW_CUTS, meshes_distance
 from clamp3d.engine.model import LAST_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import Clamp3dError, SolverError
@@ -86,16 +86,16 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tup
 
     chords = _chords(a, b)
     for chord in chords[:1]:
-        yield "meshes", meshes_distance(a, b, T, chord, enough)
+        yield "meshes", meshes_distance(a, b, T, chord, enough, cuts=FEW_CUTS)
     yield "exact", exact_distance(a, b, T)
     probe = exact_probe(a, b, T)
-    yield "exact", probe.overlap
-    quick = exact_overlap(a, b, T, SHARES[0], quick=True, in_both=probe.in_both)
+    yield "exact", probe
+    quick = exact_overlap(a, b, T, SHARES[0], quick=True, attested=-probe.upper)
     yield "exact", quick
     for chord in chords[1:]:
         yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
     for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
-        overlap = exact_overlap(a, b, T, share, in_both=probe.in_both)
+        overlap = exact_overlap(a, b, T, share, attested=-probe.upper)
         yield "exact", overlap
         if np.isinf(overlap.lower):  # finer ones take longer
             break

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, volume_of
+from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, parse, volume_of
 from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 
@@ -101,7 +101,8 @@ def _joined(side: list[tuple[Array, IntArray]]) -> Border:
 @lru_cache(maxsize=64)
 def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     """The common part as a TopoDS_Shape, kept for who asks for its depth, its volume or finer samples."""
-    operation = occ.BRepAlgoAPI_Common(from_bytes(a), moved(from_bytes(b), np.frombuffer(pose).reshape(4, 4)))
+    # Of new copies, since it widens the tolerances of what it is given; a mesh of that is as coarse as these.
+    operation = occ.BRepAlgoAPI_Common(parse(a), moved(parse(b), np.frombuffer(pose).reshape(4, 4)))
     if not operation.IsDone():
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
     return operation.Shape()

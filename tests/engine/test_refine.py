@@ -76,15 +76,15 @@ def test_what_counts_as_known():
 def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     """A common part that was found quickly is not asked for as coarsely again, nor are meshes that were measured."""
 
-    def overlap(a, b, T, share, *, quick=False, in_both):
-        return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick} {in_both}")
+    def overlap(a, b, T, share, *, quick=False, attested):
+        return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick} {attested:g}")
 
-    def meshes(a, b, T, chord, enough, *, thorough=False):
+    def meshes(a, b, T, chord, enough, *, thorough=False, cuts=None):
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
     monkeypatch.setattr(refine, "meshes_distance", meshes)
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(exact, "exact_probe", lambda *_: exact.Probe(Distance(method="probe"), 5))
+    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
     last, finest = "0.0025 ['thorough']", "0.0006 ['thorough']"
     for first, second, fine, end in (((0.1, 0.0025), (0.1, 0.01), ["0.01 []", "0.0025 []"], [last, finest]),
@@ -103,7 +103,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     monkeypatch.setattr(refine, "meshes_distance", fails)
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(exact, "exact_probe", lambda *_: exact.Probe(Distance(method="probe"), 5))
+    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
     a = SimpleNamespace(exact=1, closed=True, chords=(), refines=True)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
