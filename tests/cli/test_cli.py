@@ -10,17 +10,18 @@ import trimesh
 
 from clamp3d import cli
 from clamp3d.bench import published
-from clamp3d.cli.options import Output, number
+from clamp3d.cli.options import Output
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import PoseWarning
+from tests.cli.boxes import boxes
 
-BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
+NO_NUMBER = "must be a finite number or a fraction like 1/3, got"
 
 
-def boxes(folder, distance, names=("a", "b")):
-    path = folder / "boxes.toml"
-    path.write_text("".join(BOX.format(name=json.dumps(name), x=k * distance) for k, name in enumerate(names)))
-    return path
+@pytest.fixture
+def apart(tmp_path):
+    """A scene of two boxes that are 10 mm apart."""
+    return boxes(tmp_path / "boxes.toml", {"a": 0, "b": 20})
 
 
 def test_run_prints_the_published_state_and_writes_json(tmp_path, main):
@@ -82,18 +83,18 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["report", "-q", "-o", "boxes.toml/x"], "boxes.toml"),
         (["report", "boxes.toml", "--method", "chords", "-o", "x"], "go with a clamp"),
         (["export", "-q", "-o", "x.stl", "--state", "P9"], "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1)"),
-        (["export", "-o", "x.stl", "--mesh-error", "wide"], "must be a finite number or a fraction like 1/3, got"),
+        *((["run", f"--step={text}"], NO_NUMBER) for text in ("1/0", "", "inf", "1,5", "1_0", "wide")),
+        (["run", "--step", "-3/2"], "step must be > 0 mm, got -1.5"),
         (["export", "-f", "dwg", "-o", "x"], "'dwg' is not one of"),
         (["export", "-f", "stl", "-o", "x", "nowhere.toml"], "nowhere.toml"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main, tmp_path, monkeypatch):
-    boxes(tmp_path, 20.0)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message, main, apart, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = main(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
-    assert [path.name for path in tmp_path.iterdir()] == ["boxes.toml"]
+    assert [*tmp_path.iterdir()] == [apart]
 
 
 def test_every_file_option_writes_to_stdout_for_a_dash():
@@ -105,8 +106,7 @@ def test_every_file_option_writes_to_stdout_for_a_dash():
 
 
 @pytest.mark.parametrize("command", ["tolerance --n 2", "sweep --steps 4", "check boxes.toml", "fit ball.stl"])
-def test_json_on_stdout_is_nothing_but_json(command, tmp_path, monkeypatch, whole_main):
-    boxes(tmp_path, 20.0)
+def test_json_on_stdout_is_nothing_but_json(command, apart, tmp_path, monkeypatch, whole_main):
     trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "ball.stl")
     before = sorted(tmp_path.iterdir())
     monkeypatch.chdir(tmp_path)
@@ -117,8 +117,8 @@ def test_json_on_stdout_is_nothing_but_json(command, tmp_path, monkeypatch, whol
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_only_one_file_can_be_stdout(tmp_path, whole_main):
-    code, out, err = whole_main("check", boxes(tmp_path, 20.0), "--html", "-", "--json", "-")
+def test_only_one_file_can_be_stdout(apart, whole_main):
+    code, out, err = whole_main("check", apart, "--html", "-", "--json", "-")
     assert (code, out) == (2, "")
     assert "only one file can be stdout" in err
 
@@ -164,23 +164,11 @@ def test_a_fault_is_one_line_and_no_finding(error, code, message, monkeypatch, m
 
 
 def test_control_characters_do_not_reach_the_terminal(tmp_path, whole_main):
-    names = ("\x1b[31mred", "bell\x07\u202e")
-    code, out, err = whole_main("check", boxes(tmp_path, 9.0, names))
+    places = {"\x1b[31mred": 0, "bell\x07\u202e": 9}
+    code, out, err = whole_main("check", boxes(tmp_path / "boxes.toml", places))
     assert code == 1
     assert "\\x1b[31mred" in out
     assert all(c.isprintable() or c == "\n" for c in out + err)
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("1/3", 1 / 3), (" 2e-3 ", 2e-3), ("-3/2", -1.5), *((text, None) for text in ("1/0", "", "inf", "1,5", "1_0"))],
-)
-def test_numbers_may_be_fractions_and_nothing_else(text, value):
-    if value is not None:
-        assert number(text) == value
-    else:
-        with pytest.raises(click.BadParameter, match="must be a finite number or a fraction like 1/3, got"):
-            number(text)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import time
 import pytest
 import trimesh
 
-BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
+from tests.cli.boxes import boxes
+
 COMMAND = [sys.executable, "-m", "clamp3d"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
@@ -23,9 +24,7 @@ def clamp3d(*arguments, env=None, **kwargs):
 
 @pytest.fixture
 def scene(tmp_path):
-    path = tmp_path / "scene-a.toml"
-    path.write_text(BOX.format(name='"Ø→Ω"', x=0.0) + BOX.format(name="b", x=20.0), encoding="utf-8")
-    return path
+    return boxes(tmp_path / "scene-a.toml", {"Ø→Ω": 0, "b": 20})
 
 
 def test_help_lists_every_command_and_loads_no_numeric_library():
@@ -70,18 +69,21 @@ class TestText:
 
 
 @pytest.mark.parametrize(("value", "command"), [("now", "run"), ("1.5", "conductors"), ("9" * 20, "conductors")])
-def test_a_bad_date_is_bad_input_and_an_empty_one_is_none(value, command):
-    done = clamp3d(command, env={"SOURCE_DATE_EPOCH": value})
-    assert (done.returncode, done.stdout) == (2, b"")
+def test_a_bad_date_is_bad_input(value, command, main, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", value)
     wanted = f"clamp3d: error: SOURCE_DATE_EPOCH must be whole seconds since 1970, got '{value}'\n"
-    assert done.stderr.decode() == wanted
-    assert clamp3d("conductors", env={"SOURCE_DATE_EPOCH": ""}).returncode == 0
+    assert main(command) == (2, "", wanted)
+
+
+def test_an_empty_date_is_none(main, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "")
+    assert main("conductors")[0] == 0
 
 
 class TestStreams:
     @pytest.mark.parametrize("arguments", [(), ("--json", "-")])
     def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(self, arguments, tmp_path):
-        (tmp_path / "a.toml").write_text(BOX.format(name="a", x=0.0) + BOX.format(name="b", x=9.0))
+        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
         with subprocess.Popen(
             [*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
         ) as process:
@@ -90,16 +92,18 @@ class TestStreams:
             assert process.wait(120) == 1
 
     @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
-    @pytest.mark.parametrize("arguments", [("--help",), ("check", "a.toml")])
-    def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, tmp_path):
-        (tmp_path / "a.toml").write_text(BOX.format(name="a", x=0.0) + BOX.format(name="b", x=9.0))
+    @pytest.mark.parametrize(
+        ("arguments", "stream", "count"),
+        [(["--help"], "stdout", 1), (["check", "a.toml"], "stdout", 1), (["check", "none.toml"], "stderr", 0)],
+    )
+    def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, stream, count, tmp_path):
+        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
         with open("/dev/full", "w") as full:
-            streams = {"stdout": full, "stderr": subprocess.PIPE}
+            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
             done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
-            assert done.returncode == 2
-            assert done.stderr.count(b"error") == done.stderr.count(b"No space left on device") == 1
-            silent = subprocess.run([*COMMAND, "check", "none.toml"], stderr=full, check=False, env=ENVIRONMENT)
-        assert silent.returncode == 2
+        said = done.stderr or b""
+        assert done.returncode == 2
+        assert said.count(b"error") == said.count(b"No space left on device") == count
 
 
 @posix
@@ -165,7 +169,7 @@ def test_no_file_is_written_over_what_is_read_or_over_another(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     for name, x in (("a", 0.0), ("b", 5.0)):
         trimesh.creation.box((1.0, 2.0, 3.0)).apply_translation((x, 0.0, 0.0)).export(f"{name}.stl")
-    (tmp_path / "scene.toml").write_text(BOX.format(name="a", x=0.0) + BOX.format(name="b", x=20.0))
+    boxes(tmp_path / "scene.toml", {"a": 0, "b": 20})
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     for arguments, problem in (
         (("check", "scene.toml", "--json", "./scene.toml"), "cannot write scene.toml: it is the input"),

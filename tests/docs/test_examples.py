@@ -24,9 +24,8 @@ from sybil.example import SybilFailure
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
 from clamp3d import cli
+from tests.docs.project import PAGES, ROOT
 
-ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 PYTHON = shlex.quote(sys.executable)
 BASH = f'clamp3d() {{ {PYTHON} -m clamp3d "$@"; }}; python() {{ {PYTHON} "$@"; }}\n'
 

@@ -1,29 +1,20 @@
 """What is declared holds: extras are named where they are needed, and what is missing is said in one line."""
 
 import re
-import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
 from clamp3d.errors import EXTRAS
+from tests.docs.project import ROOT, python
 
-ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 TOOLS = {"all", "dev", "docs", "peers"}
-ORDINARY = {"trimesh", "python-fcl", "coacd", "numpy", "meshcat"}
 
 
 def names(lines):
     return {re.match(r"[\w-]+", line)[0] for line in lines}
-
-
-def test_what_every_run_may_use_is_ordinary():
-    assert names(PROJECT["dependencies"]) >= ORDINARY
-    heavy = {"matplotlib", "scikit-image", "lib3mf", "mpmath", "pandas", "dask", "cadquery-ocp-novtk"}
-    assert not names(PROJECT["dependencies"]) & heavy
 
 
 def test_every_extra_is_known_and_in_all():
@@ -40,8 +31,7 @@ def test_readme_names_every_extra_beside_what_needs_it():
 
 
 def test_lower_bounds_are_constraints():
-    done = subprocess.run([sys.executable, ROOT / ".ci/lowest"], capture_output=True, text=True, check=True)
-    lowest = dict(line.split("==") for line in done.stdout.splitlines())
+    lowest = dict(line.split("==") for line in python(".ci/lowest").stdout.splitlines())
     assert (lowest["trimesh"], lowest["rtree"], lowest["coacd"]) == ("5", "1.4.1", "1.0.10")
     assert names(PROJECT["dependencies"]) <= lowest.keys()
 

@@ -3,11 +3,8 @@
 import ast
 import json
 from functools import cache
-from pathlib import Path
 
-import pytest
-
-ROOT = Path(__file__).parents[2]
+from tests.docs.project import ROOT
 
 
 @cache
@@ -28,9 +25,3 @@ def test_every_test_that_is_named_exists():
     named = [row["test"] for row in rows if "test" in row]
     assert len(named) > 10
     assert not [test for test in named if missing(test)]
-
-
-@pytest.mark.parametrize("test", ["tests/docs/test_mutation.py::test_gone", "tests/test_gone.py::test_it"])
-def test_one_that_is_gone_is_seen(test):
-    assert missing(test)
-    assert not missing("tests/docs/test_mutation.py::test_one_that_is_gone_is_seen[x]")

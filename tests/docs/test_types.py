@@ -1,13 +1,8 @@
 """A user's script sees the real types: mypy --strict on it reveals them, and no `Any`."""
 
 import re
-import subprocess
-import sys
-from pathlib import Path
 
-import clamp3d
-
-ROOT = Path(clamp3d.__file__).parents[1]
+from tests.docs.project import ROOT, python
 
 SCRIPT = """
 import clamp3d
@@ -34,14 +29,7 @@ REVEALED = [
 def test_mypy_sees_what_a_user_gets(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
     cache = f"--cache-dir={ROOT / '.mypy_cache' / 'user'}"
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--config-file=", cache, "script.py"],
-        cwd=tmp_path,
-        env={"MYPYPATH": "", "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-m", "mypy", "--strict", "--config-file=", cache, "script.py", cwd=tmp_path, MYPYPATH="")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.findall(r'note: Revealed type is "(.*)"', done.stdout) == REVEALED
 
@@ -49,5 +37,4 @@ def test_mypy_sees_what_a_user_gets(tmp_path):
 def test_the_import_costs_next_to_nothing():
     heavy = {"numpy", "numba", "scipy", "trimesh", "fcl", "click", "matplotlib", "msgspec", "rich"}
     code = f"import sys, clamp3d; print(sorted({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    assert python("-c", code).stdout == "[]\n"

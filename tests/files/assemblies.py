@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from igl import winding_number
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Fuse
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -20,9 +18,10 @@ from OCP.TopLoc import TopLoc_Location
 from clamp3d.files.cad import Key, matrix
 from clamp3d.files.open_cascade import explore
 from clamp3d.files.solid import BrepSolid, require_open_cascade
-from tests.cad import Tree, ball, common_volume, cone, cut, location, moved, ring, rod, shift
+from tests.cad import Tree, ball, cone, cut, location, moved, ring, rod, shift, volume
 from tests.cad import block as box
 from tests.cad import first_solid as solid_of
+from tests.output.step_reader import bounds
 
 
 def fuse(shape, *others):
@@ -126,11 +125,7 @@ class Truth:
 
 def near(solids, margin=1.0):
     """Pairs (i, j) whose boxes are less than ``margin`` mm apart."""
-    corners = []
-    for solid in solids:
-        bounds = Bnd_Box()
-        BRepBndLib.AddOptimal_s(solid, bounds, False, False)
-        corners.append(np.array([point.Coord() for point in (bounds.CornerMin(), bounds.CornerMax())]))
+    corners = [bounds(solid) for solid in solids]
     pairs = itertools.combinations(range(len(solids)), 2)
     return [(i, j) for i, j in pairs
             if np.maximum(corners[i][0] - corners[j][1], corners[j][0] - corners[i][1]).max() < margin]  # fmt: skip
@@ -146,11 +141,10 @@ def truth(a, b):
     distance = separation(a, b)
     if distance > 1e-7:
         return Truth(distance)
-    volume = common_volume(a, b)
-    if volume <= 1e-9:  # or the boolean has failed: ask some points
-        return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
     common = BRepAlgoAPI_Common(a, b).Shape()
-    return Truth(0.0, volume, max(deepest(common, x) for x in (a, b)))
+    if (shared := volume(common)) <= 1e-9:  # or the boolean has failed: ask some points
+        return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
+    return Truth(0.0, shared, max(deepest(common, x) for x in (a, b)))
 
 
 def judged(verdict, lower, upper, known):

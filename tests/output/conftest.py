@@ -1,26 +1,22 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from clamp3d.clamp.assemble import assemble
-from clamp3d.clamp.dimensions import PARTS, Clamp
-from clamp3d.clamp.loader import load_clamp
+from clamp3d import assemble, load_clamp
+from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.engine.scene import Scene
-from clamp3d.output.report import Report, make_report
+from clamp3d.output.report import make_report
 from clamp3d.output.report_page import report_html
 
 
 @pytest.fixture(scope="session")
-def reference() -> Clamp:
+def reference():
     return load_clamp()
 
 
 @pytest.fixture(scope="session")
-def odd_poses() -> dict[str, np.ndarray]:
+def odd_poses():
     """A turned and moved pose for each part: a transposed matrix or a swapped axis cannot hide in it."""
     generator = np.random.default_rng(7)
     poses = {}
@@ -33,26 +29,20 @@ def odd_poses() -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="session")
-def odd_scene(reference: Clamp, odd_poses: dict[str, np.ndarray]) -> Scene:
+def odd_scene(reference, odd_poses):
     """The seven parts at those poses."""
     return clamp_scene(reference, odd_poses)
 
 
 @pytest.fixture(scope="session")
-def reference_report() -> Report:
+def reference_report():
     return make_report(assemble(others=True))
 
 
 @pytest.fixture(scope="session")
-def odd_report(reference_report: Report) -> Report:
-    """The report of a clamp whose name is not to be taken for markup."""
+def odd_page(reference_report):
+    """The page, which takes seconds to draw, of a clamp whose name is not to be taken for markup."""
     clamp = replace(reference_report.assembly.clamp, name="<b>x</b>&", description="<script>alert(1)</script>")
-    return replace(reference_report, assembly=replace(reference_report.assembly, clamp=clamp))
-
-
-@pytest.fixture(scope="session")
-def odd_page(odd_report: Report) -> str:
-    """Its page, which takes seconds to draw."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        return report_html(odd_report)
+        return report_html(replace(reference_report, assembly=replace(reference_report.assembly, clamp=clamp)))

@@ -1,23 +1,16 @@
 """``clamp3d export`` from the command line to the files, and the committed review set."""
 
-from __future__ import annotations
-
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
 from clamp3d.clamp.dimensions import PARTS
+from tests.docs.project import ROOT, python
 
-ROOT = Path(__file__).resolve().parents[2]
 
-
-def test_final_state_is_exported_where_it_is_published(main, tmp_path: Path) -> None:
+def test_final_state_is_exported_where_it_is_published(main, tmp_path):
     code, out, err = main("export", "--format", "glb", "--output", tmp_path)
     assert code == 0
     assert out.split() == [str(tmp_path / "reference.glb"), str(tmp_path / "manifest-glb.json")]
@@ -30,7 +23,7 @@ def test_final_state_is_exported_where_it_is_published(main, tmp_path: Path) -> 
     assert scene.bounds[1][1] == pytest.approx(0.120184, abs=1e-6)
 
 
-def test_scenes_and_meshes_are_exported_too(main, tmp_path: Path) -> None:
+def test_scenes_and_meshes_are_exported_too(main, tmp_path):
     hinge = ROOT / "examples" / "hinge"
     assert main("export", hinge / "scene.toml", "-o", tmp_path / "hinge.3mf")[0] == 0
     meshes = [trimesh.load(hinge / f"{name}.stl") for name in ("leaf-a", "leaf-b", "pin")]
@@ -38,23 +31,20 @@ def test_scenes_and_meshes_are_exported_too(main, tmp_path: Path) -> None:
     assert trimesh.load(tmp_path / "hinge.3mf").bounds == pytest.approx(expected, abs=1e-5)
     assert main("export", hinge / "pin.stl", "-f", "obj", "-o", tmp_path / "pin")[0] == 0
     assert (tmp_path / "pin" / "pin.obj").is_file()
+    assert main("export", ROOT / "examples/v-block/scene.toml", "--clashes", "-o", tmp_path / "all.glb")[0] == 0
+    assert [n for n in trimesh.load(tmp_path / "all.glb").graph.nodes_geometry if n.startswith("clash ")]
+    assert main("export", "--clashes", "-q", "--output", tmp_path / "clamp.glb")[0] == 2  # a clamp has none to give
+    assert not (tmp_path / "clamp.glb").exists()
     _, out, _ = main("export", "-o", tmp_path / "final.step", "-q")
     assert out.split() == [str(tmp_path / f"final.step{s}") for s in ("", ".manifest.json")]
 
 
-def test_review_set_is_what_a_new_build_gives() -> None:
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "scripts" / "build-meshes"), "--check"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+def test_review_set_is_what_a_new_build_gives():
+    done = python("scripts/build-meshes", "--check")
     assert (done.stdout, done.returncode) == ("", 0), done.stderr
 
 
-def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(main, tmp_path: Path) -> None:
+def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(main, tmp_path):
     """The jumper is in its groove, the saddle on the bolt still waits below."""
     order = ("--sequence", "P1 -> P7 -> P2 -> P3|P4 -> P5")
     assert main("export", "-f", "glb", "-o", tmp_path / "a", *order, "--state", "P7")[0] == 0
@@ -63,17 +53,3 @@ def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(main, tmp_pa
     assert abs(place["P7"][0] - place["P1"][0]) < 137.0
     assert place["P3"][2] < place["P1"][2] - 150.0
     assert main("export", "-f", "stl", "-o", tmp_path / "c", *order)[0] == 2
-
-
-def test_clashes_are_exported_on_demand(main, tmp_path: Path) -> None:
-    """A scene file gives the bodies of its clashes; a clamp has none to give and is refused."""
-    (tmp_path / "scene.toml").write_text(
-        '[parts.a]\nshape = "box"\nsize = [10, 10, 10]\n[parts.b]\nshape = "box"\nsize = [10, 10, 10]\n'
-        "pose = { translation = [8, 0, 0] }\n",
-        encoding="utf-8",
-    )
-    assert main("export", tmp_path / "scene.toml", "--clashes", "-q", "--output", tmp_path / "out.glb")[0] == 0
-    scene = trimesh.load(tmp_path / "out.glb")
-    assert set(scene.graph.nodes_geometry) == {"a", "b", "clash a - b"}
-    assert main("export", "--clashes", "-q", "--output", tmp_path / "clamp.glb")[0] == 2
-    assert not (tmp_path / "clamp.glb").exists()

@@ -1,27 +1,22 @@
 """Every mesh format read back by a reader that had no part in writing it."""
 
-from __future__ import annotations
-
+import hashlib
 import json
 import math
 import struct
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
+from clamp3d import InputError, Scene, export, shapes
+from clamp3d.clamp.dimensions import PARTS, TITLES
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
-from clamp3d.engine.scene import Scene
-from clamp3d.errors import InputError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.meshing import volume_bounds
-from clamp3d.geometry.pose import translation
-from clamp3d.output.export import FORMATS, export
+from clamp3d.kernel import translation
+from clamp3d.output.export import FORMATS
 from clamp3d.output.palette import PART_COLOURS
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -29,7 +24,7 @@ MESH_ERROR = 0.02
 FACETED = [f for f in FORMATS if f != "step"]
 
 
-def read_glb(path: Path) -> dict:
+def read_glb(path):
     """The JSON of a GLB file."""
     data = path.read_bytes()
     (length,) = struct.unpack_from("<I", data, 12)
@@ -37,7 +32,7 @@ def read_glb(path: Path) -> dict:
 
 
 @pytest.mark.parametrize("format", ["stl", "ply"])
-def test_a_format_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path: Path, format: str) -> None:
+def test_a_format_that_would_lose_accuracy_is_refused(reference, tmp_path, format):
     far = np.eye(4)
     far[0, 3] = 1e6
     scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
@@ -53,9 +48,7 @@ def test_a_format_that_would_lose_accuracy_is_refused(reference: Clamp, tmp_path
 
 @pytest.mark.parametrize("format", FACETED)
 @pytest.mark.parametrize("unit", ["mm", "in"])
-def test_every_format_is_read_back_in_its_place(
-    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, format: str, unit: str
-) -> None:
+def test_every_format_is_read_back_in_its_place(reference, odd_poses, odd_scene, tmp_path, format, unit):
     """By trimesh's readers: each part where it stands, closed, of its volume, and in its colour where there are any."""
     unit = "m" if format == "glb" else unit
     written = export(odd_scene, tmp_path, format=format, layout="parts", mesh_error=MESH_ERROR, unit=unit)
@@ -83,7 +76,7 @@ def test_every_format_is_read_back_in_its_place(
             assert (np.asarray(solid.visual.vertex_colors)[:, :3] == colour).all()
 
 
-def test_glb_is_y_up_with_named_coloured_nodes(odd_poses: dict, odd_scene: Scene, tmp_path: Path) -> None:
+def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
     written = export(odd_scene, tmp_path, format="glb", mesh_error=MESH_ERROR)
     tree = read_glb(written.files[0])
     assert tree["asset"]["extras"] == {"unit": "m", "mesh_error_mm": MESH_ERROR}
@@ -102,7 +95,7 @@ def test_glb_is_y_up_with_named_coloured_nodes(odd_poses: dict, odd_scene: Scene
         assert [round(255 * c) for c in srgb] == list(trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3])
 
 
-def test_obj_has_named_coloured_objects(odd_scene: Scene, tmp_path: Path) -> None:
+def test_obj_has_named_coloured_objects(odd_scene, tmp_path):
     model, materials = export(odd_scene, tmp_path, format="obj", layout="assembly", mesh_error=MESH_ERROR).files
     scene = trimesh.load(model, split_objects=True, group_material=False, process=False)
     assert set(scene.geometry) == {f"{n}_{TITLES[n].replace(' ', '_')}" for n in PARTS}
@@ -113,7 +106,7 @@ def test_obj_has_named_coloured_objects(odd_scene: Scene, tmp_path: Path) -> Non
         assert f"newmtl {name}_" in materials.read_text()
 
 
-def test_3mf_by_lib3mf(odd_scene: Scene, tmp_path: Path) -> None:
+def test_3mf_by_lib3mf(odd_scene, tmp_path):
     lib3mf = pytest.importorskip("lib3mf", reason="lib3mf is not installed")
     written = export(odd_scene, tmp_path, format="3mf", mesh_error=MESH_ERROR)
     model = lib3mf.get_wrapper().CreateModel()
@@ -135,11 +128,7 @@ def test_3mf_by_lib3mf(odd_scene: Scene, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("format", FACETED)
-def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
-    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, format: str
-) -> None:
-    import hashlib
-
+def test_same_input_gives_the_same_bytes_as_the_manifest_says(reference, odd_poses, odd_scene, tmp_path, format):
     runs = [export(odd_scene, tmp_path / str(i), format=format, mesh_error=MESH_ERROR) for i in range(2)]
     for a, b in zip((*runs[0].files, runs[0].manifest), (*runs[1].files, runs[1].manifest), strict=True):
         assert a.read_bytes() == b.read_bytes()
@@ -165,7 +154,7 @@ def test_same_input_gives_the_same_bytes_and_the_manifest_tells_of_them(
         np.testing.assert_allclose(trimesh.load(runs[0].files[0]).bounds, expected, atol=tolerance)
 
 
-def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd_scene: Scene, tmp_path: Path) -> None:
+def test_bad_settings_are_one_clear_line_and_leave_no_file(reference, odd_scene, tmp_path):
     for source, arguments, message in [
         (reference, {"format": "dxf"}, "format must be one of stl, obj, ply, glb, 3mf, step, got 'dxf'"),
         (reference, {}, "output must end in one of stl, obj, ply, glb, 3mf, step, or be a folder with a format"),
@@ -184,7 +173,7 @@ def test_bad_settings_are_one_clear_line_and_leave_no_file(reference: Clamp, odd
     assert not (tmp_path / "none").exists()
 
 
-def test_files_are_written_whole_or_not_at_all(reference: Clamp, tmp_path: Path) -> None:
+def test_files_are_written_whole_or_not_at_all(reference, tmp_path):
     (tmp_path / "P7-jumper.stl").mkdir()
     (tmp_path / "P1-up-splint.stl").write_text("mine")
     with pytest.raises(InputError, match=r"cannot write .*P7-jumper\.stl: it is a folder"):
@@ -196,7 +185,7 @@ def test_files_are_written_whole_or_not_at_all(reference: Clamp, tmp_path: Path)
         export(reference, tmp_path / "file", format="stl")
 
 
-def test_any_name_gives_readable_files(odd_scene: Scene, tmp_path: Path) -> None:
+def test_any_name_gives_readable_files(odd_scene, tmp_path):
     odd = replace(odd_scene, name='Überklemme <5>/"a"\nnext\x01')
     for format in FACETED:
         written = export(odd, tmp_path, format=format, layout="assembly", mesh_error=0.5)
@@ -206,9 +195,7 @@ def test_any_name_gives_readable_files(odd_scene: Scene, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["world", "root", "P3"])
-def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(
-    odd_scene: Scene, tmp_path: Path, name: str
-) -> None:
+def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(odd_scene, tmp_path, name):
     """A clamp called "world" became trimesh's own root: its parts lost the turn to Y up."""
     plain, odd = (
         trimesh.load(export(replace(odd_scene, name=n), tmp_path / f"{i}.glb", mesh_error=0.5).files[0])
@@ -224,12 +211,14 @@ def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(
     assert [m["name"] for m in tree["meshes"]] == ["world", "root"]
 
 
-def test_a_scene_of_drawn_solids_and_meshes(tmp_path: Path) -> None:
+def test_a_scene_of_drawn_solids_and_meshes(tmp_path):
     """A named file by its suffix; a mesh keeps its facets; volumes without a closed form lie between bounds."""
     block = trimesh.creation.box((4.0, 6.0, 8.0))
     tube = shapes.cylinder(5.0, 40.0, bore=3.0)
     scene = Scene(name="pair").add("tube", tube, translation(0, 0, 7))
-    scene = scene.add("a/b", shapes.MeshShape(make_mesh(block.vertices, block.faces))).add("a-b", shapes.box((1, 1, 1)))
+    scene = scene.add("a/b", shapes.MeshShape(shapes.make_mesh(block.vertices, block.faces))).add(
+        "a-b", shapes.box((1, 1, 1))
+    )
     written = export(scene, tmp_path / "pair.STL", mesh_error=0.2)
     assert [p.name for p in (*written.files, written.manifest)] == ["pair.STL", "pair.STL.manifest.json"]
     listing = json.loads(written.manifest.read_text())

@@ -1,25 +1,18 @@
 """Files read back by Open CASCADE: STEP with true surfaces, names, colours and units; GLB in mm, Z up."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp
+from clamp3d import Scene, check, export, load, shapes
+from clamp3d.clamp.dimensions import PARTS, TITLES
 from clamp3d.clamp.parts import parts
-from clamp3d.engine.check import check
-from clamp3d.engine.scene import Scene
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.geometry import shapes
-from clamp3d.geometry.pose import rotation, translation
-from clamp3d.output.export import export
+from clamp3d.kernel import rotation, translation
 from clamp3d.output.palette import PART_COLOURS
-from clamp3d.scenefile.load import load
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
@@ -33,9 +26,7 @@ from tests.output.step_reader import bounds, read_step
     ("unit", "words"),
     [("mm", "SI_UNIT(.MILLI.,.METRE.)"), ("in", "CONVERSION_BASED_UNIT('INCH'"), ("m", "SI_UNIT($,.METRE.)")],
 )
-def test_step_assembly(
-    reference: Clamp, odd_poses: dict, odd_scene: Scene, tmp_path: Path, capfd, unit: str, words: str
-) -> None:
+def test_step_assembly(reference, odd_poses, odd_scene, tmp_path, capfd, unit, words):
     written = export(odd_scene, tmp_path, format="step", unit=unit)
     assert capfd.readouterr().out == ""  # stdout is for data
     assert words in written.files[0].read_text()
@@ -53,9 +44,9 @@ def test_step_assembly(
         assert (product.colour, entry["chord_error_mm"]) == (PART_COLOURS[name], 0.0)
 
 
-def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp, tmp_path: Path) -> None:
+def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference, tmp_path):
     written = export(reference, tmp_path, format="step", layout="parts")
-    radii: dict[str, Counter[float]] = {}
+    radii = {}
     for name, path in zip(PARTS, written.files, strict=True):
         (product,) = read_step(path)
         assert product.path == (f"{name} {TITLES[name]}",)
@@ -74,7 +65,7 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference: Clamp
 
 
 @pytest.mark.parametrize("suffix", ["step", "glb"])
-def test_clashes_are_bodies_of_their_own(tmp_path: Path, suffix: str) -> None:
+def test_clashes_are_bodies_of_their_own(tmp_path, suffix):
     """Two turned boxes and a pin in one of them: the common parts, calculated by hand, under the pairs' names."""
     scene = Scene().add("a", shapes.box((10, 10, 10)), translation(3, 0, 0)).add("b", shapes.box((10, 10, 10)))
     scene = scene.moved({"b": translation(11, 2, 1)}).add("pin", shapes.cylinder(1.0, 4.0), translation(3, 0, 6))
@@ -92,7 +83,7 @@ def test_clashes_are_bodies_of_their_own(tmp_path: Path, suffix: str) -> None:
         assert volumes[name] == pytest.approx(volume, rel=tolerance)
 
 
-def test_step_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_step_is_read_as_it_was_written(tmp_path):
     """A pin 0.5 mm over a drilled box, in a tube that is 1 mm wider; nothing is square to the axes."""
     skew = translation(3.0, 4.0, -5.0) @ rotation((1.0, 2.0, 3.0), 0.7)
     scene = Scene().add("box", shapes.box((12.0, 10.0, 8.0), holes=[shapes.Hole(2.0, (1.0, 0.5))]), skew)

@@ -1,7 +1,5 @@
 """STEP and GLB go out as a STEP file came in: tree, names, colours and instances, read by other readers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -9,19 +9,14 @@ from dataclasses import replace
 
 import pytest
 
-from clamp3d.engine.check import check
-from clamp3d.engine.scene import Scene
-from clamp3d.geometry import shapes
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import translation
+from clamp3d import Motion, Scene, check, shapes, view
+from clamp3d.kernel import translation
 from clamp3d.output.baseline import compare
 from clamp3d.output.groups import grouped
 from clamp3d.output.report import make_report
 from clamp3d.output.scene_report import check_to_dict, check_to_text
-from clamp3d.output.viewer import view
 from clamp3d.output.wording import headline
-
-BOX = '[parts.{name}]\nshape = "box"\nsize = [10, 10, 10]\npose = {{ translation = [{x}, 0, 0] }}\n'
+from tests.cli.boxes import boxes
 
 
 def rail(depths, names=None):
@@ -162,14 +157,10 @@ def test_one_part_of_many_that_moves_is_named_though_its_verdict_stays(tmp_path)
 
 def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
-
-    def boxes(**places):
-        (tmp_path / "boxes.toml").write_text("".join(BOX.format(name=name, x=x) for name, x in places.items()))
-
-    boxes(a=0, b=9, c=30)
+    boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 30})
     assert main("check", "boxes.toml", "--json", "last.json")[0] == 1
     assert main("check", "boxes.toml", "--baseline", "last.json")[0] == 0
-    boxes(a=0, b=9, c=17)
+    boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 17})
     code, out, _ = main("check", "boxes.toml", "--baseline", "last.json", "--csv", "new.csv")
     assert code == 1
     assert "since the baseline: 1 new, 0 changed, 0 gone, 1 unchanged, 0 accepted" in out
@@ -186,7 +177,7 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert "no finding now" not in out
     main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen")
     assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
-    boxes(a=0, b=9, c=8)
+    boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 8})
     assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
 
 
@@ -206,7 +197,8 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
 )
 def test_bad_baselines_and_identifiers_are_one_line(arguments, files, message, tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
-    for name, text in (files | {"boxes.toml": BOX.format(name="a", x=0) + BOX.format(name="b", x=9)}).items():
+    boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9})
+    for name, text in files.items():
         (tmp_path / name).write_text(text)
     code, out, err = main(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)

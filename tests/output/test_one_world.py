@@ -5,23 +5,18 @@ import io
 
 import pytest
 
-from clamp3d.clamp.assemble import assemble
-from clamp3d.engine.check import check
-from clamp3d.engine.distance import measure
+from clamp3d import assemble, check, measure, view
 from clamp3d.output.report import make_report
 from clamp3d.output.report_page import report_csv, report_to_dict
 from clamp3d.output.scene_report import check_to_dict
-from clamp3d.output.viewer import view
-
-WIRES = [(None, None), ("LGJ-240/40", "12.5")]
 
 
-@pytest.mark.parametrize(("line", "jumper"), WIRES)
-def test_every_output_says_the_same(line, jumper):
-    assembly = assemble("reference", line=line, jumper=jumper)
+@pytest.mark.parametrize("wires", [{}, {"line": "LGJ-240/40", "jumper": "12.5"}])
+def test_every_output_says_the_same(wires, reference_report):
+    found = make_report(assemble(**wires)) if wires else reference_report
+    assembly = found.assembly
     truth = measure(assembly.scene)
     assert len(truth) == 21
-    found = make_report(assembly)
     checked = check_to_dict(check(assembly.scene, distances=True))["pairs"]
     with view(assembly, serve=False, mesh_error=0.5) as viewer:
         shown = viewer.story["stops"][-1]["rows"]

@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not inst
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
-def bearing(path: Path, radius: float) -> Path:
+def bearing(path, radius):
     """The bearing M8-22-7, whose balls overlap both races in its library's model, on a shaft of this radius."""
     from bd_warehouse.bearing import SingleRowDeepGrooveBallBearing
     from build123d import Compound, Cylinder, export_step
@@ -25,7 +24,7 @@ def bearing(path: Path, radius: float) -> Path:
 
 
 @pytest.fixture(scope="module")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def faulty(tmp_path_factory):
     """A folder with its shaft 0.03 mm too thick, checked."""
     folder = tmp_path_factory.mktemp("review")
     files = [f"--{kind}={folder / name}" for kind, name in (("json", "a.json"), ("csv", "a.csv"), ("bcf", "a.bcfzip"))]
@@ -37,14 +36,14 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_three_rows_and_the_planted_fault_is_the_first(faulty: Path) -> None:
+def test_three_rows_and_the_planted_fault_is_the_first(faulty):
     groups = json.loads((faulty / "a.json").read_text())["groups"]
     rows = [(*sorted((g["a"], g["b"])), g["count"]) for g in groups]
     assert rows[0] == ("InnerRace", "Shaft", 1)
     assert sorted(rows[1:]) == [("InnerRace", "Roller", 12), ("OuterRace", "Roller", 12)]
 
 
-def test_the_second_review_names_exactly_the_change(faulty: Path, tmp_path: Path, main) -> None:
+def test_the_second_review_names_exactly_the_change(faulty, tmp_path, main):
     mended = bearing(tmp_path / "bearing.step", 4.0)
     code, out, _ = main("check", mended, "--baseline", faulty / "a.json", "-q")
     assert code == 0
@@ -54,7 +53,7 @@ def test_the_second_review_names_exactly_the_change(faulty: Path, tmp_path: Path
     assert "parts moved" not in out
 
 
-def test_a_rule_by_relation_covers_the_fit_and_nothing_else(faulty: Path, main) -> None:
+def test_a_rule_by_relation_covers_the_fit_and_nothing_else(faulty, main):
     rules = ("--allow", "thread", "--allow", "press", "--allow", "*Race:Roller*=0.6")
     pairs = ("--pairs", "InnerRace:Shaft,InnerRace:Roller_1,OuterRace:Roller_1")
     code, out, _ = main("check", faulty / "bearing.step", *rules, *pairs, "-q")
@@ -64,7 +63,7 @@ def test_a_rule_by_relation_covers_the_fit_and_nothing_else(faulty: Path, main) 
     assert "  allowed: *Race:Roller* up to 0.6 mm, 2 pairs\n" in out
 
 
-def test_pandas_and_another_reader_of_bcf_open_the_findings(faulty: Path) -> None:
+def test_pandas_and_another_reader_of_bcf_open_the_findings(faulty):
     pandas = pytest.importorskip("pandas", reason="pandas (extra frame) is not installed")
     bcf = pytest.importorskip("bcf.v2.bcfxml", reason="bcf-client (extra dev) is not installed")
     frame = pandas.read_csv(faulty / "a.csv")

@@ -17,58 +17,42 @@ from pathlib import Path
 import numpy as np
 import pytest
 import skimage.color
-import trimesh
 import umsgpack
 from scipy.spatial.transform import Rotation
 
 import clamp3d.output.viewer
-from clamp3d.clamp.assemble import assemble
+from clamp3d import InputError, Motion, Scene, assemble, load_clamp, measure, shapes, view
 from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.loader import load_clamp
 from clamp3d.engine.check import check
-from clamp3d.engine.distance import measure
-from clamp3d.engine.scene import Scene
-from clamp3d.errors import Clamp3dError, InputError
-from clamp3d.geometry import shapes
-from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import translation
+from clamp3d.errors import Clamp3dError
+from clamp3d.kernel import translation
 from clamp3d.output import placed, serving
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS, part_colours
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
-from clamp3d.output.viewer import Viewer, view
+from clamp3d.output.viewer import Viewer
 from clamp3d.output.viewer_story import ClampStory
+from tests.cli.boxes import boxes
 
-BAD = ("clash", "contained")
 
-
-class Recorder(Viewer):
-    """A viewer that keeps all commands in ``commands``."""
-
-    def __init__(self, *arguments, **options):
-        self.commands = []
-        super().__init__(*arguments, **options)
-
-    def _send(self, command):
-        self.commands.append(command)
-        super()._send(command)
+def commands_of(viewer):
+    return [umsgpack.unpackb(base64.b64decode(message)) for message in viewer._log.messages()]
 
 
 @pytest.fixture(scope="module")
 def recorded():
     """The viewer of the reference clamp, and its assembly."""
-    viewer = Recorder(ClampStory(load_clamp()), mesh_error=0.1)
+    viewer = Viewer(ClampStory(load_clamp()), mesh_error=0.1)
     assembly = assemble("reference", on_waypoint=viewer.show)
     viewer.finish(assembly)
     return viewer, assembly
 
 
-def plate_and_pin(travel=30.0):
-    """A pin that goes ``travel`` mm down on a plate whose face is 10 mm below it."""
+def plate_and_pin():
+    """A pin that goes 30 mm down on a plate whose face is 10 mm below it."""
     scene = Scene(name="pin over plate", clearance=0.5)
     scene = scene.add("plate", shapes.box((50.0, 40.0, 4.0)), translation(0.0, 0.0, -2.0))
     scene = scene.add("pin", shapes.cylinder(5.0, 20.0), translation(3.0, 0.0, 20.0))
-    return scene.with_motion(Motion.translate((0, 0, -travel), parts="pin", name="down"))
+    return scene.with_motion(Motion.translate((0, 0, -30.0), parts="pin", name="down"))
 
 
 def read(url, host=None):
@@ -92,26 +76,17 @@ def answers(port):
         return s.connect_ex(("127.0.0.1", port)) == 0
 
 
-def animation_of(viewer):
-    commands = [c for c in viewer.commands if c["type"] == "set_animation"]
-    return {a["path"]: a["clip"] for a in commands[-1]["animations"]}
-
-
-def line_of(command):
-    packed = command["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data
-    return np.frombuffer(packed, dtype=np.float32).reshape(-1, 3)
-
-
-def test_the_way_to_a_stop_takes_as_long_as_it_is(recorded):
-    viewer, assembly = recorded
-    for (a, start), (b, end) in itertools.pairwise(zip(viewer.story["stops"], assembly.path, strict=True)):
-        length = max(np.linalg.norm((end.T_world(part) - start.T_world(part))[:3, 3]) for part in assembly.poses)
-        assert b["arrive"] - a["leave"] == pytest.approx(np.clip(2.0 * length / viewer._drawing.size, 0.9, 4.0))
+def points_of(commands, command):
+    """The points (n, 3) of the first geometry of an object that is sent."""
+    uuid = command["object"]["object"]["geometry"]
+    (sent,) = (c["geometry"] for c in commands if c["type"] == "set_geometry" and c["path"] == uuid)
+    return np.frombuffer(sent["data"]["attributes"]["position"]["array"].data, dtype=np.float32).reshape(-1, 3)
 
 
 def test_nut_turns_as_often_as_the_assembly_says_and_clockwise_from_above(recorded):
     viewer, assembly = recorded
-    clips = animation_of(viewer)
+    *_, command = (c for c in commands_of(viewer) if c["type"] == "set_animation")
+    clips = {a["path"]: a["clip"] for a in command["animations"]}
     assert len({clip["tracks"][0]["keys"][-1]["time"] for clip in clips.values()}) == 1  # three.js ends each by itself
     (track,) = (t for t in clips["/clamp3d/parts/P5"]["tracks"] if t["name"] == ".quaternion")
     turned = 0.0
@@ -132,30 +107,26 @@ def test_every_value_at_every_waypoint_is_what_measure_says(recorded):
             assert row["at_least_mm"] == pytest.approx(d.lower, abs=1e-9)
 
 
-def dots_of(viewer):
-    """Names of the pair and place of each dot at each stop."""
-    for command in viewer.commands:
-        if command["type"] == "set_transform" and command["path"].endswith(("/point", "/point a", "/point b")):
-            group, pair = command["path"].split("/")[3:5]
-            yield int(group.split()[0]) - 1, tuple(pair.split("-")), np.reshape(command["matrix"], (4, 4))[3, :3]
-
-
 def test_every_dot_lies_between_the_nearest_points_of_its_pair(recorded):
     viewer, assembly = recorded
-    dots = list(dots_of(viewer))
-    assert len([dot for dot in dots if dot[0] == len(assembly.path) - 1]) == 8
-    for number, pair, point in dots:
-        (row,) = (r for r in viewer.story["stops"][number]["rows"] if (r["a"], r["b"]) == pair)
-        np.testing.assert_allclose(point, np.mean([row["point_a"], row["point_b"]], axis=0), atol=1e-9)
+    seen = []
+    for command in commands_of(viewer):
+        if command["type"] == "set_transform" and command["path"].endswith(("/point", "/point a", "/point b")):
+            group, pair = command["path"].split("/")[3:5]
+            seen.append(int(group.split()[0]))
+            (row,) = (r for r in viewer.story["stops"][seen[-1] - 1]["rows"] if f"{r['a']}-{r['b']}" == pair)
+            point = np.reshape(command["matrix"], (4, 4))[3, :3]
+            np.testing.assert_allclose(point, np.mean([row["point_a"], row["point_b"]], axis=0), atol=1e-9)
+    assert seen.count(len(assembly.path)) == 8
 
 
 def test_an_arrow_for_each_contact_force_as_long_as_its_part_of_the_bolts(recorded):
     viewer, assembly = recorded
     whole = float(re.search(r"([\d.]+) mm for the whole", viewer.html())[1])
-    arrows = {}
-    for c in viewer.commands:
+    arrows, commands = {}, commands_of(viewer)
+    for c in commands:
         if re.match(f"/clamp3d/forces/{len(assembly.path)} nut tightened/.*/arrow$", c["path"]):
-            arrows[c["path"].split("/")[4]] = line_of(c)
+            arrows[c["path"].split("/")[4]] = points_of(commands, c)
     contacts = [force for force in assembly.forces if force.feature != HELD]
     assert list(arrows) == [f"{f.a}-{f.b}" for f in contacts]
     pushes = {}
@@ -226,11 +197,12 @@ def test_a_clean_clamp_has_notes_and_no_findings(recorded):
 def test_clash_at_rest_is_marked_where_it_is():
     scene = Scene(name="clash").add("a", shapes.box((10.0, 10.0, 10.0)))
     scene = scene.add("b", shapes.box((10.0, 10.0, 10.0)), translation(9.0, 1.0, 2.0))
-    viewer = Recorder(scene)
+    viewer = Viewer(scene)
     viewer.finish(check(scene, distances=True))
     (finding,) = viewer.story["findings"]
     assert "overlap 1.000" in finding["text"]
-    box = line_of(next(c for c in viewer.commands if c["path"].endswith("a-b/box")))
+    commands = commands_of(viewer)
+    box = points_of(commands, next(c for c in commands if c["path"].endswith("a-b/box")))
     margin = 0.01 * 19.0
     np.testing.assert_allclose(box.min(axis=0), np.array([4.0, -4.0, -3.0]) - margin, atol=1e-5)
     np.testing.assert_allclose(box.max(axis=0), np.array([5.0, 5.0, 5.0]) + margin, atol=1e-5)
@@ -247,19 +219,15 @@ def test_names_from_a_file_cannot_become_markup():
 
 def test_equal_parts_are_meshed_and_written_once(monkeypatch):
     made = []
-    monkeypatch.setattr(placed, "mesh", lambda shape, error: made.append(shape) or mesh(shape, error))
-    drawn = []
-    smooth = trimesh.graph.smooth_shade
-    monkeypatch.setattr(trimesh.graph, "smooth_shade", lambda *a, **k: drawn.append(1) or smooth(*a, **k))
+    monkeypatch.setattr(placed, "mesh", lambda shape, error: made.append(shape) or shapes.mesh(shape, error))
     scene = Scene()
     for k in range(70):
         shape = shapes.cylinder(3, 10) if k % 3 == 0 else shapes.box((5, 5, 5))  # equal, not the same
         scene = scene.add(f"p{k}", shape, translation(20.0 * k, 0, 0))
     with view(scene, serve=False) as viewer:
-        messages = [umsgpack.unpackb(base64.b64decode(message)) for message in viewer._log.messages()]
+        sent = [command["type"] for command in commands_of(viewer)]
     assert len(made) == 2
-    assert len(drawn) == 2
-    assert [message["type"] for message in messages].count("set_geometry") == 4  # faces and edges
+    assert sent.count("set_geometry") == 4  # faces and edges
 
 
 def test_a_foreign_name_or_another_file_is_refused():
@@ -357,13 +325,10 @@ def test_without_a_meshcat_server_there_is_an_error(monkeypatch):
         MeshcatServer("http://127.0.0.1:7000/static/")
 
 
-def command_line(*arguments):
-    return [sys.executable, "-m", "clamp3d", *arguments]
-
-
-def test_view_serves_until_interrupted_and_leaves_nothing():
+def test_view_serves_until_interrupted_and_leaves_nothing(tmp_path):
+    scene = boxes(tmp_path / "boxes.toml", {"a": 0, "b": 20})
     process = subprocess.Popen(
-        command_line("view", "--draw-error", "0.1"),
+        [sys.executable, "-m", "clamp3d", "view", scene],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
