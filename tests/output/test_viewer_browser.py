@@ -248,13 +248,6 @@ def test_play_halts_at_first_contact_and_goes_on_when_asked(hinge_page):
     assert not page.evaluate("viewer.animator.playing")
 
 
-def assert_names_of_stops_are_apart(page):
-    marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
-    marks = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
-    assert marks
-    assert all(right <= left for (_, right), (left, _) in itertools.pairwise(marks))
-
-
 def test_page_on_a_phone(dark_phone):
     page = dark_phone
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -268,7 +261,6 @@ def test_page_on_a_phone(dark_phone):
     page.tap(".finding")
     page.wait_for_timeout(200)
     assert page.query_selector(".finding.now")
-    assert_names_of_stops_are_apart(page)
 
 
 def test_page_in_dark_mode_is_dark_and_readable(dark_phone):
@@ -396,6 +388,10 @@ def test_page_steps_through_the_sequence(served):
             np.testing.assert_allclose(T[:3, 3], pose[:3, 3], atol=2e-4)
             if name != "P5":  # the nut also turns
                 np.testing.assert_allclose(T[:3, :3], pose[:3, :3], atol=1e-5)
+        marks = [e.bounding_box() for e in page.query_selector_all("#marks button") if e.inner_text()]
+        spans = sorted((box["x"], box["x"] + box["width"]) for box in marks if box["width"] > 8)
+        assert spans
+        assert all(right <= left for (_, right), (left, _) in itertools.pairwise(spans))  # names never cover each other
         for kind in ("contacts", "gaps"):
             assert [visible(page, kind, group) for group in groups] == [group == groups[number] for group in groups]
         page.click("#forward")
