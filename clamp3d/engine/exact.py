@@ -28,12 +28,12 @@ _NARROW = 9e-3
 
 
 def exact_distance(a: Model, b: Model, T: Array) -> Distance:
-    """Distance of ``b`` at ``T`` (4, 4) in a's frame; where the solids touch or overlap nothing from below."""
+    """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least."""
     assert a.exact is not None
     assert b.exact is not None
-    gap, p, q = cad_process.distance(a.exact.brep, b.exact.brep, T)
-    if gap <= TOLERANCE:
-        return Distance(-np.inf, TOLERANCE, p, q, None, None, "exact", METHOD)
+    gap, p, q, is_least = cad_process.distance(a.exact.brep, b.exact.brep, T)
+    if gap <= TOLERANCE or not is_least:
+        return Distance(-np.inf, gap + TOLERANCE, p, q, None, None, "exact", METHOD)
     return Distance(gap - TOLERANCE, gap + TOLERANCE, p, q, (q - p) / np.linalg.norm(q - p), None, "exact", METHOD)
 
 
