@@ -76,7 +76,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         ``upper`` is minus a depth that a point has, ``lower`` minus the length of a verified translation, minus
         infinity if none was found; ``normal`` is its direction.
     """
-    if distance.lower >= 0.0 or not (a.closed and b.closed):
+    if distance.lower >= 0.0 or not (a.is_simple and b.is_simple):
         return distance if distance.lower >= 0.0 else distance.of_overlap()
     interference = (max(0.0, -distance.upper), max(0.0, -distance.lower))
     exact = depth_of_pieces(a, b, T)

@@ -71,7 +71,7 @@ def kind_of_overlap(a: Model, b: Model, T: Array, contact: float) -> Verdict:
 
 def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, within ``contact`` mm."""
-    if not (inner.closed and outer.closed and inner.chords and outer.chords):
+    if not (inner.is_simple and outer.is_simple and inner.chords and outer.chords):
         return False
     if not _boxes_allow(inner, outer, T, contact):
         return False

@@ -40,10 +40,7 @@ def meshes_distance(
     """
     chord_error = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
     distance = _between_meshes(a, b, T, error, enough, thorough=thorough, cuts=cuts)
-    crossing = [m.name for m in (a, b) if m.outer(error).crosses_itself] if distance.upper < 0.0 else []
-    return replace(
-        distance, method=f"meshes (FCL){chord_error}{''.join(f', {name} crosses itself' for name in crossing)}"
-    )
+    return replace(distance, method=f"meshes (FCL){chord_error}")
 
 
 def _between_meshes(

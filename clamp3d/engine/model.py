@@ -93,6 +93,11 @@ class Model:
         return True
 
     @property
+    def is_simple(self) -> bool:
+        """Whether it is closed, and no triangles cross each other: those of a given mesh may be walls inside it."""
+        return True
+
+    @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
         raise NotImplementedError
@@ -254,6 +259,17 @@ class MeshModel(Model):
         """Whether it is known what is inside: not of a mesh with open or crossed edges."""
         return self.shape.mesh.watertight
 
+    @cached_property
+    def is_simple(self) -> bool:
+        """Whether it is closed, and no triangles cross each other: then each has the part on one side."""
+        if not self.closed:
+            return False
+        import igl.predicates
+
+        mesh = self.shape.mesh
+        V, F = np.ascontiguousarray(mesh.vertices), np.ascontiguousarray(mesh.faces)
+        return not igl.predicates.find_self_intersections(V, F, True)[0]
+
     @property
     def chords(self) -> tuple[float, ...]:
         """One, for the given triangles."""
@@ -269,10 +285,10 @@ class MeshModel(Model):
     @cached_property
     def bodies(self) -> Forms | None:
         """Bodies around the mesh with the cylinders, grooves and holes of the fit, or its hull if it is convex."""
-        if not self.closed:
+        if not self.is_simple:
             return None
         mesh = self.outer(DRAWN_CHORDS[0])
-        if self._fit is None or not self._fit.features or mesh.crosses_itself:
+        if self._fit is None or not self._fit.features:
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
 
@@ -281,7 +297,7 @@ class MeshModel(Model):
     @cached_property
     def _fit(self) -> FitResult | None:
         """Round surfaces found in the mesh; None where none are looked for."""
-        if self.shape.fit == "off" or not self.closed:
+        if self.shape.fit == "off" or not self.is_simple:
             return None
         from clamp3d.fit.fit import fit_mesh
 
@@ -296,7 +312,7 @@ class MeshModel(Model):
         for k, feature in enumerate(self._fit.features if self._fit is not None else ()):
             error[feature.faces] = np.maximum(error[feature.faces], feature.error_bound + self.shape.error)
             patch[feature.faces] = k + 1
-        return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error, given=True)
+        return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error, self.is_simple)
 
 
 def model_of(shape: Shape, counters: Counters) -> Model:

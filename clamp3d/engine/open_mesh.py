@@ -1,4 +1,4 @@
-"""Meshes that are not closed: distance of the surfaces, and whether they cross; what is inside them is not known.
+"""Meshes that are not closed or cross themselves: distance of the surfaces, and whether those of two parts cross.
 
 Where an edge of one mesh pierces a triangle of the other, it still does after a move that is short beside what is left
 of both around the place. So a crossing has a depth that is certain, without an inside.
@@ -23,13 +23,15 @@ OPEN_ERROR = 0.016
 
 
 def open_distance(a: Model, b: Model, T: Array) -> Distance:
-    """Distance of ``b`` at ``T`` (4, 4) in a's frame where the mesh of one, or of both, is not closed.
+    """Distance of ``b`` at ``T`` (4, 4) in a's frame where the mesh of one, or of both, is not closed or not simple.
 
     Without a crossing the surfaces are as far apart as said. If an open mesh seems to wind round the other part,
-    nothing says that they are apart: ``lower`` is minus infinity.
+    nothing says that they are apart: ``lower`` is minus infinity. What a closed mesh winds round is inside it.
     """
     names = " and ".join(model.name for model in (a, b) if not model.closed)
-    return replace(_surface_distance(a, b, T), method=f"surfaces (FCL), inside of {names} unknown")
+    notes = [f"inside of {names} unknown"] if names else []
+    notes += [f"{model.name} crosses itself" for model in (a, b) if model.closed and not model.is_simple]
+    return replace(_surface_distance(a, b, T), method=", ".join(["surfaces (FCL)", *notes]))
 
 
 def _surface_distance(a: Model, b: Model, T: Array) -> Distance:

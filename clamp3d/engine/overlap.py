@@ -28,24 +28,15 @@ _HAIR = 1e-9
 
 @dataclass(eq=False)
 class Common:
-    """The common part of two meshes, a closed mesh in the frame of the first: ``vertices`` (n, 3), ``faces`` (m, 3).
-
-    ``crosses_itself``: whether one of the two does; then it may cover some of its space more than once.
-    """
+    """The common part of two meshes, a closed mesh in the frame of the first: ``vertices`` (n, 3), ``faces`` (m, 3)."""
 
     vertices: Array
     faces: NDArray[np.int64]
-    crosses_itself: bool = False
 
     @cached_property
     def volume(self) -> float:
-        """Volume in mm^3; what is covered twice counts twice."""
+        """Volume in mm^3."""
         return max(0.0, float(volume(self.vertices, self.faces)))
-
-    @property
-    def volume_bounds(self) -> tuple[float, float]:
-        """Volume in mm^3, at least and at most: that of the box where it may cover some of it more than once."""
-        return (0.0, float(np.prod(np.ptp(self.box, axis=0)))) if self.crosses_itself else (self.volume, self.volume)
 
     @property
     def box(self) -> Array:
@@ -67,7 +58,7 @@ class Common:
         rows = rows[area[rows] > 0.0]
         depth = self.volume / max(float(area.sum()), 1e-300)
         points = self.vertices[self.faces[rows]].mean(axis=1) - depth * normal[rows]
-        return np.asarray(points[Surface(self.vertices, self.faces, given=self.crosses_itself).contains(points)])
+        return np.asarray(points[Surface(self.vertices, self.faces).contains(points)])
 
     def directions(self, most: int = 4) -> Array:
         """Unit vectors (k, 3) square to the largest flat sides of the common part."""
@@ -94,7 +85,7 @@ def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
     intersection = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
     vertices, faces = arrays_of(intersection)
-    return Common(vertices, faces, a.crosses_itself or b.crosses_itself) if len(faces) else None
+    return Common(vertices, faces) if len(faces) else None
 
 
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:
@@ -115,10 +106,9 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
 
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
     corner, and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where
-    one body may be swallowed whole, since the surfaces then say nothing of its middle, and where one crosses itself:
-    the nearest triangle may be a wall inside it.
+    one body may be swallowed whole, since the surfaces then say nothing of its middle.
     """
-    if shared.crosses_itself or 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
+    if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
     bound = np.inf
     for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):

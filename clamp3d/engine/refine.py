@@ -60,7 +60,7 @@ def refine(a: Model, b: Model, T: Array, start: Distance, enough: Enough, *, cad
 
 def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
     """What the levels that apply to a pair say, from cheap to expensive; each is measured when it is asked for."""
-    if not (a.closed and b.closed):
+    if not (a.is_simple and b.is_simple):
         yield "meshes", open_distance(a, b, T)
         return
     if cad_forms or a.exact is None or b.exact is None:

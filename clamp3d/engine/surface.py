@@ -30,13 +30,13 @@ class Surface:
 
     ``face_error`` (m,) mm: every point of the true surface is within this of a triangle, and the other way round;
     None where the mesh is the part, or holds it, or is held by it.
-    ``given``: whether the triangles are somebody's, which may cross each other.
+    ``is_simple``: whether no triangles cross each other, so that each has the part on one side.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
     face_error: Array | None = None
-    given: bool = False
+    is_simple: bool = True
 
     def __post_init__(self) -> None:
         self.vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
@@ -151,18 +151,9 @@ class Surface:
         return away < 0.0, np.asarray(is_certain)
 
     @cached_property
-    def crosses_itself(self) -> bool:
-        """Whether given triangles of a closed mesh cross each other: then some of them are walls inside the part."""
-        if not (self.given and is_closed(self.faces)):
-            return False
-        import igl.predicates
-
-        return bool(igl.predicates.find_self_intersections(self.vertices, self.faces, True)[0])
-
-    @cached_property
     def _has_sides(self) -> bool:
         """Whether each triangle has the part on one side, and what is outside on the other."""
-        return is_closed(self.faces) and not self.crosses_itself
+        return self.is_simple and is_closed(self.faces)
 
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""

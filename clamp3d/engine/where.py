@@ -64,7 +64,7 @@ class Locator:
     @cached_property
     def overlap(self) -> Overlap | None:
         """Where they overlap; None if not even meshes around them do, or one has no inside that is known."""
-        if not (self.a.closed and self.b.closed):
+        if not (self.a.is_simple and self.b.is_simple):
             return None
         both_exact = self.a.exact is not None and self.b.exact is not None
         chords = sorted({*self.a.chords, *self.b.chords}, reverse=True) if self.a.chords and self.b.chords else []
@@ -92,13 +92,13 @@ class Locator:
             inner = common(inner_a, inner_b, self.T_ab)
         off = outer_a.error + outer_b.error
         slack = (off + 1e-11 * (outer_a.scale + outer_b.scale)) * float(outer.areas[1].sum())
-        low = 0.0 if inner is None else max(0.0, inner.volume_bounds[0] - slack)
+        low = 0.0 if inner is None else max(0.0, inner.volume - slack)
         point = None
         if inner is not None and inner_a is not None and inner_b is not None:
             point = to_target(self.T_a, deepest(inner_a, inner_b, self.T_ab, inner)[1])
         box = _box(to_target(self.T_a, outer.vertices), off)
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
-        return Overlap((low, outer.volume_bounds[1] + slack), box, unknown_error and off == 0.0, point)
+        return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
 
     def _exact(self, rough: Overlap | None) -> Overlap | None:
         """From Open CASCADE, for two solids from CAD; None where it fails."""

@@ -90,7 +90,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     for first, second, fine, end in (((0.1, 0.0025), (0.1, 0.01), ["0.01 []", "0.0025 []"], [last, finest]),
                                      ((0.1, 0.0025), (0.1, 0.0025), ["0.0025 []"], [finest]),
                                      ((), (), [], [last, finest])):  # fmt: skip
-        a, b = (SimpleNamespace(exact=1, closed=True, chords=chords, refines=True) for chords in (first, second))
+        a, b = (SimpleNamespace(exact=1, is_simple=True, chords=chords, refines=True) for chords in (first, second))
         order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
         assert order[: -len(end)] == [*["0.1 []"] * bool(first), "distance", "probe", "0.04 True 5", *fine,
                                       *["0.04 False 5"] * (not found), "0.015 False 5", "0.004 False 5"]  # fmt: skip
@@ -105,7 +105,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
-    a = SimpleNamespace(exact=1, closed=True, chords=(), refines=True)
+    a = SimpleNamespace(exact=1, is_simple=True, chords=(), refines=True)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
     assert len(answers) == 6

@@ -101,19 +101,6 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
             away = [np.linalg.norm(np.maximum(0.0, np.maximum(b[0] - place[1], place[0] - b[1]))) for b in boxes]
             assert distance.lower <= min(away) <= distance.upper <= min(away) + 1e-9
             continue
-        assert pair.verdict.value in {"clash", "contained"}
+        assert pair.verdict is Verdict.CLASH
         assert "crosses itself" in distance.method
         assert 0.0 < -distance.upper <= HALF + 0.5 - abs(centre[2])
-        assert union(place - distance.lower * distance.normal, boxes) < 1e-9
-        assert -distance.lower <= HALF + 0.5 - abs(centre[2]) + 1e-9
-        low, high = pair.where.volume
-        assert low <= truth <= high
-
-
-def test_how_deep_a_bar_lies_is_not_bounded_by_walls_inside():
-    """Its middle is 8 mm from the top, and 2 mm from a wall inside."""
-    part, _ = loop()
-    scene = Scene(contact=3.0)
-    pair = check(scene.add("loop", part).add("bar", shapes.box((2, 2, 100)), translation(26, 0, 0))).pairs[0]
-    assert pair.verdict is not Verdict.CONTACT
-    assert pair.distance.interference is None or pair.distance.interference[1] >= HALF
