@@ -262,13 +262,7 @@ class MeshModel(Model):
     @cached_property
     def is_simple(self) -> bool:
         """Whether it is closed, and no triangles cross each other: then each has the part on one side."""
-        if not self.closed:
-            return False
-        import igl.predicates
-
-        mesh = self.shape.mesh
-        V, F = np.ascontiguousarray(mesh.vertices), np.ascontiguousarray(mesh.faces)
-        return not igl.predicates.find_self_intersections(V, F, True)[0]
+        return self.closed and not self.shape.mesh.crosses_itself()
 
     @property
     def chords(self) -> tuple[float, ...]:

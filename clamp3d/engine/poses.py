@@ -17,7 +17,7 @@ from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Model, ModelCache
 from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.scene import Scene
-from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds, Verdict
+from clamp3d.engine.verdict import VERDICTS, Thresholds, Verdict
 from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, check_pose_array, inverse
 
@@ -137,7 +137,7 @@ def check_poses(
     T = check_pose_array(array("poses", poses, (None, 4, 4), finite=False))
     moving, standing = cache.model(scene.parts[number].shape), [cache.model(scene.parts[k].shape) for k in rest]
     P = np.array([scene.parts[k].T_world for k in rest]).reshape(-1, 4, 4)
-    reach = scene.thresholds.reach + RESOLUTION
+    reach = scene.thresholds.reach
     boxes = Boxes.of(np.broadcast_to(moving.bounds, (len(T), 2, 3)), T)
     still = Boxes.of(np.array([model.bounds for model in standing]).reshape(-1, 2, 3), P)
     row, column = near_between(boxes, still, reach).T

@@ -84,7 +84,7 @@ class Surface:
     @cached_property
     def shell_points(self) -> Array:
         """A vertex (k, 3) of each connected surface."""
-        return self.vertices[[self.faces[rows[0], 0] for rows in shells(self.faces, len(self.vertices))]]
+        return self.vertices[[self.faces[rows[0], 0] for rows in shells(self.faces)]]
 
     @cached_property
     def normals(self) -> Array:

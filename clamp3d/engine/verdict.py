@@ -56,7 +56,7 @@ class Thresholds:
     @property
     def reach(self) -> float:
         """Pairs further apart than this (mm) are clear."""
-        return max(self.contact, self.clearance)
+        return max(self.contact, self.clearance) + RESOLUTION
 
     def verdict(self, distance: Distance, allowance: float | None = None) -> Verdict:
         """The verdict that all distances between the bounds of ``distance`` share, else uncertain.

@@ -52,6 +52,21 @@ class Mesh:
         """Triangles (m,) without a normal: no higher than the rounding of their corners."""
         return _slivers(self.vertices, self.faces, self.rounding)
 
+    def crosses_itself(self) -> bool:
+        """Whether triangles reach through each other, by more than the rounding of their corners."""
+        import igl.predicates
+
+        V, F = np.ascontiguousarray(self.vertices), np.ascontiguousarray(self.faces)
+        _, pairs, _ = igl.predicates.find_self_intersections(V, F, False)
+        through = np.full(len(pairs), np.inf)
+        for own, other in (pairs.T, pairs.T[::-1]):  # some that are listed do no more than touch
+            a, b, c = np.moveaxis(V[F[other]], 1, 0)
+            normal = np.cross(b - a, c - a)
+            normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+            height = np.einsum("kij,kj->ki", V[F[own]] - a[:, None], normal)
+            through = np.minimum(through, np.minimum(height.max(axis=1), -height.min(axis=1)))
+        return bool((through > 4.0 * self.rounding).any())
+
 
 def make_mesh(
     vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh", scale: float = 1.0, float32: bool = False
@@ -105,8 +120,10 @@ def make_mesh(
     if fault:
         notes.append(fault)
     if watertight:
-        F = _outward(V, F, name, notes)
+        F = _outward(V, F, notes)
         V, F = _united(V, F, notes, pinched=bool(fault))
+        if not volume(V, F) > 0.0:
+            raise InputError(f"{name}: the surface encloses no volume")
     mesh = Mesh(name, V, F, watertight, rounding, tuple(notes))
     slivers = mesh.slivers
     if slivers.all():
@@ -158,7 +175,7 @@ def _one_winding(V: Array, F: IntArray, notes: list[str]) -> IntArray:
     return np.where(turned[:, None], F[:, ::-1], F)
 
 
-def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
+def _outward(V: Array, F: IntArray, notes: list[str]) -> IntArray:
     """The faces of a closed mesh wound outward, body by body; ``notes`` say what was turned."""
     if volume(V, F) < 0.0:
         F = np.ascontiguousarray(F[:, ::-1])
@@ -166,8 +183,6 @@ def _outward(V: Array, F: IntArray, name: str, notes: list[str]) -> IntArray:
     for rows in inside_out(V, F):
         F[rows] = F[rows][:, ::-1]
         notes.append(f"a body of {len(rows)} triangles inside out: turned")
-    if not volume(V, F) > 0.0:
-        raise InputError(f"{name}: the surface encloses no volume")
     return F
 
 
@@ -176,7 +191,7 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
 
     ``pinched``: whether bodies share vertices, so that they are one connected surface.
     """
-    connected = shells(F, len(V))
+    connected = shells(F)
     if len(connected) == 1 and not pinched:
         return V, F
     import manifold3d
@@ -186,17 +201,24 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
         surfaces = [part for surface in surfaces for part in surface.decompose()]
     surfaces.sort(key=lambda surface: float(surface.volume()))
     solids = [surface for surface in surfaces if surface.volume() > 0.0]
-    if len(solids) < 2 or any(surface.is_empty() for surface in surfaces):
+    if len(surfaces) < 2 or any(surface.is_empty() for surface in surfaces):
         return V, F
     bodies = [*solids]
-    for corners, triangles in map(arrays_of, surfaces[: -len(solids)]):  # cavities, each of the smallest solid round it
-        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), corners[:1])[0] > 0.5)
-        k = next(around, -1)
-        bodies[k] -= as_manifold(corners, triangles[:, ::-1])
+    for corners, triangles in map(arrays_of, surfaces[: len(surfaces) - len(solids)]):
+        inside = as_manifold(corners, triangles[:, ::-1])
+        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), corners).mean() > 0.5)
+        k = next(around, None)
+        if k is None:
+            bodies.append(inside)
+            notes.append(f"a body of {len(triangles)} triangles inside out: turned")
+        else:  # a cavity, of the smallest solid round it
+            bodies[k] -= inside
+    if len(bodies) < 2:
+        return V, F
     whole = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
     if whole.num_tri() == len(F) and np.isclose(whole.volume(), volume(V, F), rtol=1e-9):
         return V, F
-    notes.append(f"{len(solids)} bodies in the mesh, some of which overlap or touch: taken as one")
+    notes.append(f"{len(bodies)} bodies in the mesh, some of which overlap or touch: taken as one")
     return arrays_of(whole)
 
 

@@ -47,9 +47,11 @@ def joined(groups: Faces, n: int) -> Faces:
     return np.asarray(least[place])
 
 
-def shells(faces: Faces, vertices: int) -> list[NDArray[np.intp]]:
-    """Rows of ``faces`` of each connected surface; ``vertices`` is how many there are."""
-    label = joined(faces, vertices)[faces[:, 0]]
+def shells(faces: Faces) -> list[NDArray[np.intp]]:
+    """Rows of ``faces`` of each surface that edges connect; those that share no more than corners are several."""
+    import igl
+
+    label = igl.facet_components(faces)[1]
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
@@ -85,7 +87,7 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
     it would not be seen in.
     """
     turned = []
-    for rows in shells(faces, len(vertices)):
+    for rows in shells(faces):
         if volume(vertices, faces[rows]) >= 0.0:
             continue
         rest = np.delete(faces, rows, axis=0)

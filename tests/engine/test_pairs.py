@@ -208,3 +208,9 @@ def test_a_motion_tells_where_it_is_deepest_and_is_a_finding():
     assert [f["motion"] for f in result.to_dict()["findings"]] == [row.motion] == ["down"]
     assert repr(result) == "CheckResult('scene': not clean; 1 clash, 3 clear)"
     assert "<td>down</td>" in result._repr_html_()
+
+
+def test_boxes_leave_out_no_pair_that_counts_as_contact():
+    scene = Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), translation(10.0100001, 0, 0))
+    for distances in (False, True):
+        assert check(scene, distances=distances).verdict("a", "b") is Verdict.CONTACT

@@ -104,3 +104,18 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
         assert pair.verdict is Verdict.CLASH
         assert "crosses itself" in distance.method
         assert 0.0 < -distance.upper <= HALF + 0.5 - abs(centre[2])
+
+
+@pytest.mark.parametrize(
+    "way", [(10, 10, 10), (10, 10, 0), (10, 0, 0), (10, 3, 4)], ids=["corner", "edge", "face", "part"]
+)
+@pytest.mark.parametrize("inward", [(), (0,), (1,), (0, 1), (0, 2), (0, 1, 2)])
+def test_no_body_is_lost_that_touches_others_and_is_inside_out(way, inward):
+    boxes = [np.array([[-5.0] * 3, [5.0] * 3]) + k * np.array(way) for k in range(3)]
+    whole = trimesh.util.concatenate([box_mesh(box, inward=k in inward) for k, box in enumerate(boxes)])
+    part = MeshShape(make_mesh(whole.vertices, whole.faces), "off")
+    for box in boxes:
+        probe = Scene().add("a", part).add("b", shapes.box((1, 1, 1)), translation(*box.mean(axis=0)))
+        pair = check(probe).pairs[0]
+        assert pair.verdict is Verdict.CONTAINED
+        assert pair.where.volume == pytest.approx((1.0, 1.0))
