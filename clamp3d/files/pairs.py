@@ -24,6 +24,8 @@ _SLENDER = 400.0
 
 _AT_EDGES = 9.0 / 4.0
 """How many times as far as in a triangle's middle a quadratic surface can be from it, at the middle of an edge."""
+_BEYOND = 0.05
+"""How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
 
@@ -138,7 +140,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
             continue
         chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max()))
         middle = points[quads[len(quads) // 2, 3]]
-        away = [_from_surface(solid, middle) for solid in solids]
+        away = [_from_surface(solid, middle)[0] for solid in solids]
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append((points, quads[:, :3]))
@@ -189,18 +191,25 @@ def _heights(points: Array) -> Array:
 
 
 def depths(brep: bytes, points: Array) -> Array:
-    """Signed depth (k,) mm of points (k, 3) in a solid: negative outside."""
+    """Signed depth (k,) mm of points (k, 3) in a solid: negative outside, or where nobody knows the side."""
     shape = from_bytes(brep)
-    side = occ.BRepClass3d_SolidClassifier(shape)
-    signed = np.array([_from_surface(shape, point) for point in points])
-    for k, point in enumerate(points.tolist()):
-        side.Perform(occ.gp_Pnt(*point), TOLERANCE)
-        if side.State() == occ.TopAbs_State.TopAbs_OUT:
-            signed[k] = -signed[k]
-    return signed
+    classifier = occ.BRepClass3d_SolidClassifier(shape)
+
+    def is_outside(point: Array) -> bool:
+        classifier.Perform(occ.gp_Pnt(*point.tolist()), TOLERANCE)
+        return bool(classifier.State() == occ.TopAbs_State.TopAbs_OUT)
+
+    def depth(point: Array) -> float:
+        away, foot = _from_surface(shape, point)
+        # Near splines Open CASCADE errs. Beyond the foot is the other side: if it says the same of both, none counts.
+        beyond = foot + min(1.0, _BEYOND / max(away, TOLERANCE)) * (foot - point)
+        return -away if is_outside(point) or not is_outside(beyond) else away
+
+    return np.array([depth(point) for point in points])
 
 
-def _from_surface(solid: Any, point: Array) -> float:
-    """Distance (mm) of a point (3,) from the surface of a solid, on either side."""
+def _from_surface(solid: Any, point: Array) -> tuple[float, Array]:
+    """Distance (mm) of a point (3,) from the surface of a solid, on either side, and the point (3,) nearest to it."""
     vertex = _vertex(point)
-    return min(float(occ.BRepExtrema_DistShapeShape(shell, vertex).Value()) for shell in explore(solid, "SHELL"))
+    nearest = min((_nearest(shell, vertex) for shell in explore(solid, "SHELL")), key=lambda pair: pair.distance)
+    return nearest.distance, nearest.p

@@ -105,3 +105,22 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
             assert nearest.distance == pytest.approx(gap, abs=1e-6)
         assert np.linalg.norm(nearest.q - nearest.p) == pytest.approx(nearest.distance, abs=1e-9)
     assert (missed > 0) is not known
+
+
+@pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])
+def test_no_depth_where_both_sides_of_a_surface_are_said_to_be_inside(state, monkeypatch):
+    """Open CASCADE says so of some points beside splines; what it says of the other side shows it."""
+
+    class Wrong:
+        def __init__(self, _):
+            self.State = lambda: getattr(pairs.occ.TopAbs_State, state)
+
+        def Perform(self, *_):
+            pass
+
+    monkeypatch.setattr(pairs.occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
+    points = np.array([[0.0, 0.0, 5.1], [0.0, 0.0, 4.9], [0.0, 0.0, 1.0]])
+    brep = BrepSolid.of(ball(5.0), "ball").brep
+    assert pairs.depths(brep, points) == pytest.approx([-0.1, -0.1, -4.0])
+    monkeypatch.undo()
+    assert pairs.depths(brep, points) == pytest.approx([-0.1, 0.1, 4.0])
