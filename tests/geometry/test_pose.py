@@ -115,3 +115,11 @@ def test_what_is_worse_than_rounding_is_refused(bad, rule):
 @given(hnp.arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: np.abs(q).max() > 0.1))
 def test_turns_of_quaternions_are_scipys(q):
     np.testing.assert_allclose(turn_of(*q.tolist()), Rotation.from_quat(q).as_matrix(), atol=1e-15)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_stretched_axis_is_refused_by_the_kernel(axis):
+    stretched = np.eye(4)
+    stretched[axis, axis] = 1.0001
+    with pytest.raises(InputError, match="deviates from orthonormal"):
+        signed_distance(GROOVE, WIRE, stretched)

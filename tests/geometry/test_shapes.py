@@ -95,6 +95,7 @@ REACH, OTHER = 7.0 * math.sin(1.0), 5.0 * math.sin(0.9)
         (lambda x: block(1.0 / x), 0.5 / REACH, r"x = 0 mm leaves the block: width must be > 11\.78"),
         (lambda x: block(1.0 / x, 40.0, 2.0), 1.0 / 14.0, "width must be > 14 mm"),
         (lambda x: block(others=[(x, 5.0, 0.9)]), 25.0 - OTHER, "leaves the block: width must be > 50 mm"),
+        (lambda x: block(holes=[Hole(2.0, (1.0, -x), "y")]), 27.0, "lies beside"),
         (lambda x: block(height=1.0 / x), 1.0 / (7.0 - 7.0 * math.cos(1.0)), r"height must be > 3\.217"),
         (lambda x: block(others=[(-1.0 / x, 5.0, 0.9)]), 1.0 / (REACH + OTHER), r"must be > 9\.806"),
         (lambda x: MeshShape(sphere(2.0).mesh, error=x), 1e5, "error of a mesh must be >= 0 and < 100000 mm"),
