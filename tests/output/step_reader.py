@@ -3,6 +3,8 @@
 import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -13,7 +15,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from tests.cad import matrix, volume
+from tests.cad import matrix
 
 
 class Leaf:
@@ -72,6 +74,13 @@ def colour_of(label):
     if XCAFDoc_ColorTool.GetColor_s(label, XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour):
         return Quantity_Color.ColorToHex_s(colour).ToCString()
     return None
+
+
+def volume(shape):
+    """To 1e-9 of it, where tests.cad takes the default."""
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-9)
+    return properties.Mass()
 
 
 def bounds(shape):
