@@ -68,7 +68,8 @@ def _depths(a: Model, b: Model, T: Array, points: Array) -> Array:
 
 def _attested(points: Array, depths: Array) -> Distance:
     """The overlap that the deepest of points (k, 3) attests; one that lies beside a solid attests none."""
-    overlaps = np.where(depths.min(axis=0) >= -2.0 * TOLERANCE, depths.max(axis=0), 0.0)
+    beside = np.minimum(depths.min(axis=0), 0.0)  # by so much it is moved into both solids, and less deep
+    overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, 0.0)
     k = int(np.argmax(overlaps))
     return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
 
