@@ -23,8 +23,8 @@ _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
-_NARROW = 9e-3
-"""Overlap (mm) that is allowed for where Open CASCADE finds none."""
+_NARROW, _HIDING = 9e-3, 0.01
+"""Overlap (mm) allowed for where Open CASCADE finds none, and chord error of meshes whose points would show it."""
 
 
 def exact_distance(a: Model, b: Model, T: Array) -> Distance:
@@ -37,17 +37,17 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
     return Distance(gap - TOLERANCE, gap + TOLERANCE, p, q, (q - p) / np.linalg.norm(q - p), None, "exact", METHOD)
 
 
-def exact_probe(a: Model, b: Model, T: Array, *, level: int = 0, points_each: int = _PROBED) -> Distance:
+def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_each: int = _PROBED) -> Distance:
     """How deep some points of the common part of meshes lie in two solids that touch or overlap.
 
     The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
-    ``level``: which of the meshes, the coarsest by default. ``points_each``: points that look deepest in one solid, and
-    in both.
+    ``chord``: chord error (mm) of the meshes, that of the coarsest by default. ``points_each``: points that look
+    deepest in one solid, and in both.
     """
     nothing = Distance(level="exact", method=METHOD)
     if not (a.chords and b.chords):
         return nothing
-    meshes = [model.outer(model.chords[level]) for model in (a, b)]
+    meshes = [model.outer(min(model.chords[0], chord)) for model in (a, b)]
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
         return nothing
@@ -111,9 +111,9 @@ def _missed(a: Model, b: Model, T: Array, attested: float) -> Distance | None:
     """What is known where Open CASCADE finds no common part; None if a point lies in one that it missed.
 
     It misses those between round faces that are nearly tangent: of a ball and a ring one of 0.014 mm was seen. No proof
-    that there is none, so `_NARROW` is allowed for: about what fine meshes of both would have to be off by to hide it.
+    that there is none, so `_NARROW` is allowed for: one so deep is wider than the facets of the meshes looked at.
     """
-    if attested > _FAINT or -exact_probe(a, b, T, level=-1, points_each=_MANY).upper > _FAINT:
+    if attested > _FAINT or -exact_probe(a, b, T, chord=_HIDING, points_each=_MANY).upper > _FAINT:
         return None
     return Distance(-_NARROW, level="exact", method=METHOD)
 
