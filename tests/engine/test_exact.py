@@ -104,7 +104,7 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
         if nearest.is_least:
             assert nearest.distance == pytest.approx(gap, abs=1e-6)
         assert np.linalg.norm(nearest.q - nearest.p) == pytest.approx(nearest.distance, abs=1e-9)
-    assert (missed > 0) is not known
+    assert not (known and missed)
 
 
 @pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])
