@@ -92,10 +92,11 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tup
     yield "exact", probe
     quick = exact_overlap(a, b, T, SHARES[0], quick=True, attested=-probe.upper)
     yield "exact", quick
+    attested = -min(probe.upper, quick.upper)
     for chord in chords[1:]:
         yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
     for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
-        overlap = exact_overlap(a, b, T, share, attested=-probe.upper)
+        overlap = exact_overlap(a, b, T, share, attested=attested)
         yield "exact", overlap
         if np.isinf(overlap.lower):  # finer ones take longer
             break

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from clamp3d.engine.exact import _depth_bounds, exact_overlap, exact_probe
+from clamp3d.engine.exact import _attested, _depth_bounds, exact_overlap, exact_probe
 from clamp3d.engine.judge import kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
 from clamp3d.files import cad_process, pairs
@@ -69,6 +69,19 @@ def test_a_common_part_beside_the_solids_widens_the_bounds(monkeypatch):
     distance = exact_overlap(a, b, np.eye(4), 0.04)
     assert distance.lower <= -400.0  # nothing is known of it
     assert distance.upper >= 0.0
+
+
+def test_points_that_refute_a_missing_common_part_say_how_deep_it_is(monkeypatch):
+    a, b = models("ball_in_ring", -0.012)
+    monkeypatch.setattr(cad_process, "quick_common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
+    assert -0.012 <= exact_overlap(a, b, np.eye(4), 0.04, quick=True).upper < -1e-4
+
+
+def test_a_point_a_little_beside_one_solid_attests_as_much_less():
+    for beside, overlap in ((0.0, 1e-4), (1.5e-6, 1e-4 - 1.5e-6), (3e-6, 0.0)):
+        assert _attested(np.zeros((1, 3)), np.array([[-beside], [1e-4]])).upper == pytest.approx(
+            1e-6 - overlap, abs=1e-12
+        )
 
 
 @pytest.mark.parametrize(("off", "verdict"), [(0.006, "duplicate"), (0.015, "contained")])
