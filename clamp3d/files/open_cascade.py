@@ -43,11 +43,13 @@ def require_open_cascade() -> Any:
 
 
 def _loaded() -> Any:
+    collects = gc.isenabled()
     gc.disable()  # its thousands of classes are no garbage: to look for some among them takes as long as to load them
     try:
         import OCP
     finally:
-        gc.enable()
+        if collects:
+            gc.enable()
     gc.freeze()
     return OCP
 
