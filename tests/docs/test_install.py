@@ -11,10 +11,17 @@ from tests.docs.project import ROOT, python
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 TOOLS = {"all", "dev", "docs", "peers"}
+ORDINARY = {"trimesh", "python-fcl", "coacd", "numpy", "meshcat"}
 
 
 def names(lines):
     return {re.match(r"[\w-]+", line)[0] for line in lines}
+
+
+def test_what_every_run_may_use_is_ordinary():
+    assert names(PROJECT["dependencies"]) >= ORDINARY
+    heavy = {"matplotlib", "scikit-image", "lib3mf", "mpmath", "pandas", "dask", "cadquery-ocp-novtk"}
+    assert not names(PROJECT["dependencies"]) & heavy
 
 
 def test_every_extra_is_known_and_in_all():

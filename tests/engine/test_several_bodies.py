@@ -119,3 +119,13 @@ def test_no_body_is_lost_that_touches_others_and_is_inside_out(way, inward):
         pair = check(probe).pairs[0]
         assert pair.verdict is Verdict.CONTAINED
         assert pair.where.volume == pytest.approx((1.0, 1.0))
+
+
+def test_a_plane_parts_a_small_part_from_one_that_it_lies_deep_in():
+    """The way out, 5.5 mm over the top, is longer than the lengths that are tried one after the other."""
+    whole = trimesh.util.concatenate([box_mesh(FIRST), box_mesh(SECOND["touching"])])
+    part = MeshShape(make_mesh(whole.vertices, whole.faces), "off")
+    distance = check(Scene().add("a", part).add("b", shapes.box((1, 1, 1)))).pairs[0].distance
+    assert -distance.lower == pytest.approx(5.5, abs=1e-6)
+    moved = np.array([-0.5, 0.5])[:, None] - distance.lower * distance.normal
+    assert union(moved, [FIRST, np.array(SECOND["touching"])]) == pytest.approx(0.0, abs=1e-6)
