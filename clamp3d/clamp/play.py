@@ -113,7 +113,7 @@ def _approach_line(step: str, closing: Closing, log: Log) -> None:
 def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
     """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
     inside, placed = closing.start.copy(), log.section.poses(closing.start)
-    inside[3] = _opened(log.section)[1]
+    _, inside[3] = _opened(log.section)
     log.reach(step, "jumper between the splints", log.section.poses(inside))
     log.reach(step, "jumper in the up splint's groove", placed)
     log.touch(step, [("P1", "P7")], placed, float(inside[3] - closing.start[3]))

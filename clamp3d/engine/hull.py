@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.geometry.pose import Array
+from clamp3d.geometry.triangles import normals_and_areas
 
 MEMBER = 1e-9
 """Relative to the size of the parts: a point this far outside still counts as on the surface."""
@@ -36,8 +37,7 @@ class Hull:
     def edges(self) -> NDArray[np.int64]:
         """Corner numbers (k, 2) of the edges; those between two triangles of one flat face are left out."""
         F, V = self.faces, self.vertices
-        normal = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        normal, _ = normals_and_areas(V[F])
         both = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         order = np.lexsort((both[:, 1], both[:, 0]))
         pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)

@@ -15,6 +15,7 @@ from clamp3d.engine.mesh_distance import nearest_points, one_inside, rounding_of
 from clamp3d.engine.model import Model
 from clamp3d.engine.surface import Surface, fcl_pair
 from clamp3d.geometry.pose import Array, inverse, to_target
+from clamp3d.geometry.triangles import normals_and_areas
 
 _PAIRS = 4000
 """Pairs of crossing triangles that are looked at."""
@@ -86,8 +87,7 @@ def _pierced(start: Array, end: Array, triangles: Array) -> tuple[Array, Array]:
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     along = way / length[:, None]
     sides = np.roll(triangles, -1, axis=1) - triangles
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal, _ = normals_and_areas(triangles)
     cosine = np.einsum("ij,ij->i", along, normal)
     slope = np.abs(cosine)
     steep = slope > 1e-9

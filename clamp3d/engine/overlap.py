@@ -14,7 +14,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.shells import volume
-from clamp3d.geometry.triangles import closest_points
+from clamp3d.geometry.triangles import closest_points, normals_and_areas
 
 _INNER = 40
 """Triangles of an overlap under which a point is tried."""
@@ -46,10 +46,7 @@ class Common:
     @cached_property
     def areas(self) -> tuple[Array, Array]:
         """Outward unit normals (m, 3) of the triangles, and their areas (m,) in mm^2."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        cross = np.cross(b - a, c - a)
-        size = np.linalg.norm(cross, axis=1)
-        return cross / np.maximum(size, 1e-300)[:, None], 0.5 * size
+        return normals_and_areas(self.vertices[self.faces])
 
     def inner_points(self) -> Array:
         """Points (k, 3) under the middles of the largest triangles, as deep as the part is thick on average."""

@@ -17,6 +17,7 @@ from clamp3d.geometry.manifolds import as_manifold
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shells import shells, winding_numbers
+from clamp3d.geometry.triangles import normals_and_areas
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -89,10 +90,8 @@ class Surface:
     @cached_property
     def normals(self) -> Array:
         """Unit normals (m, 3) of the triangles, 0 for slivers."""
-        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
-        N = np.cross(b - a, c - a)
-        size = np.linalg.norm(N, axis=1)
-        return np.asarray(np.where((size > 1e-14 * self.scale**2)[:, None], N / np.maximum(size, 1e-300)[:, None], 0.0))
+        normal, area = normals_and_areas(self.vertices[self.faces])
+        return np.asarray(np.where((2.0 * area > 1e-14 * self.scale**2)[:, None], normal, 0.0))
 
     @cached_property
     def is_convex(self) -> bool:
@@ -204,11 +203,9 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDA
     lies on the mesh.
     """
     _, pairs, across = edges_of(faces, 2)
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal, _ = normals_and_areas(vertices[faces])
     one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]
-    convex = np.einsum("ij,ij->i", one, vertices[across[:, 1]] - a[pairs[:, 0]]) <= 1e-8
+    convex = np.einsum("ij,ij->i", one, vertices[across[:, 1]] - vertices[faces[pairs[:, 0], 0]]) <= 1e-8
     cosine = np.einsum("ij,ij->i", one, other)
     both = error[pairs]
     total = both.sum(axis=1)

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d import checks
 from clamp3d.errors import InputError
 from clamp3d.geometry.manifolds import arrays_of, as_manifold
-from clamp3d.geometry.shells import inside_out, joined, shells, volume, winding_numbers
+from clamp3d.geometry.shells import inside_out, joined, sampled, shells, volume, winding_numbers
+from clamp3d.geometry.triangles import normals_and_areas
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -60,10 +61,8 @@ class Mesh:
         _, pairs, _ = igl.predicates.find_self_intersections(V, F, False)
         through = np.full(len(pairs), np.inf)
         for own, other in (pairs.T, pairs.T[::-1]):  # some that are listed do no more than touch
-            a, b, c = np.moveaxis(V[F[other]], 1, 0)
-            normal = np.cross(b - a, c - a)
-            normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-            height = np.einsum("kij,kj->ki", V[F[own]] - a[:, None], normal)
+            corners = V[F[other]]
+            height = np.einsum("kij,kj->ki", V[F[own]] - corners[:, :1], normals_and_areas(corners)[0])
             through = np.minimum(through, np.minimum(height.max(axis=1), -height.min(axis=1)))
         return bool((through > 4.0 * self.rounding).any())
 
@@ -189,7 +188,7 @@ def _outward(V: Array, F: IntArray, notes: list[str]) -> IntArray:
 def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[Array, IntArray]:
     """A closed mesh without the walls between bodies that overlap or touch, which are no surface of what they make.
 
-    ``pinched``: whether bodies share vertices, so that they are one connected surface.
+    ``pinched``: whether bodies share edges, so that they are one connected surface; then some may still be inside out.
     """
     connected = shells(F)
     if len(connected) == 1 and not pinched:
@@ -206,7 +205,8 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
     bodies = [*solids]
     for corners, triangles in map(arrays_of, surfaces[: len(surfaces) - len(solids)]):
         inside = as_manifold(corners, triangles[:, ::-1])
-        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), corners).mean() > 0.5)
+        some = sampled(corners)
+        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), some).mean() > 0.5)
         k = next(around, None)
         if k is None:
             bodies.append(inside)

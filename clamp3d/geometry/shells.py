@@ -13,6 +13,7 @@ _FLAT = 1e-14
 """A volume below this part of area x extent is rounding."""
 
 _MOST_SAMPLES = 64
+"""Corners of a surface that are looked at to tell whether it lies in another."""
 
 _FEW = 8
 """Points up to which the sum over all triangles is quicker than libigl, which first builds a tree of them."""
@@ -80,6 +81,11 @@ def _solid_angles(triangles: Array) -> Array:
     return np.asarray(2.0 * np.arctan2(volume, size_a * size_b * size_c + ab * size_c + bc * size_a + ca * size_b))
 
 
+def sampled(corners: Array) -> Array:
+    """Some (k, 3) of the corners (n, 3) of a surface, all over it."""
+    return corners[:: max(1, len(corners) // _MOST_SAMPLES)]
+
+
 def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
     """Rows of ``faces`` of each closed surface that winds inward and is not a cavity of another one.
 
@@ -91,8 +97,7 @@ def inside_out(vertices: Array, faces: Faces) -> list[NDArray[np.intp]]:
         if volume(vertices, faces[rows]) >= 0.0:
             continue
         rest = np.delete(faces, rows, axis=0)
-        samples = np.unique(faces[rows])
-        samples = samples[:: max(1, len(samples) // _MOST_SAMPLES)]
-        if not len(rest) or winding_numbers(vertices, rest, vertices[samples]).min() < 0.9:
+        corners = sampled(vertices[np.unique(faces[rows])])
+        if not len(rest) or winding_numbers(vertices, rest, corners).min() < 0.9:
             turned.append(rows)
     return turned

@@ -1,10 +1,22 @@
-"""Nearest points of triangles, without trimesh, whose import takes 0.5 s of CPU."""
+"""Normals, areas and nearest points of triangles, without trimesh, whose import takes 0.5 s of CPU."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from clamp3d.geometry.pose import Array
+
+
+def normals_and_areas(triangles: Array) -> tuple[Array, Array]:
+    """Unit normals (m, 3) of triangles (m, 3, 3), 0 for those without an area, and areas (m,).
+
+    >>> [x.tolist() for x in normals_and_areas(np.array([[[0.0, 0, 0], [4, 0, 0], [0, 4, 0]]]))]
+    [[[0.0, 0.0, 1.0]], [8.0]]
+    """
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    cross = np.cross(b - a, c - a)
+    size = np.linalg.norm(cross, axis=1)
+    return cross / np.maximum(size, 1e-300)[:, None], 0.5 * size
 
 
 def closest_points(triangles: Array, points: Array) -> Array:
