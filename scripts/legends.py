@@ -1,14 +1,17 @@
-"""Tables 2 and 3 of the paper as pictures: every title is what the package answers for the case that is drawn."""
+"""Pictures for the documentation: Tables 2 and 3 of the paper, titled as the package answers, and the friction band."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clamp3d.clamp.friction import FrictionBand
 from clamp3d.kernel.arc_and_circle import ArcRelation, arc_circle
 from clamp3d.kernel.rectangle import HoleContact, HoleRelation, Rectangle, hole_bolt
+from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK, PART_COLOURS, VERDICT_COLOURS, darker
 
 if TYPE_CHECKING:
@@ -170,3 +173,33 @@ def _frame(ax: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
     ax.set_axis_off()
     ax.set_xlim(*x)
     ax.set_ylim(*y)
+
+
+def friction_figure(finder: FrictionBand, measured: Mapping[str, Sequence[float]], *, most: float = 0.3) -> Figure:
+    """The friction band over the coefficient of friction, with measured splint distances beside it.
+
+    Parameters
+    ----------
+    finder : FrictionBand
+    measured : dict of sequences of float
+        Distances in mm by what they are; each group has its own mark at the right edge.
+    most : float
+        Up to which friction the band is drawn.
+    """
+    figure = blank(7.0, 4.6)
+    axes = figure.add_subplot()
+    friction = np.linspace(0.0, most, 61)
+    ends = np.array([(finder.distance,) * 2, *(finder.ends(float(mu)) for mu in friction[1:])])
+    axes.fill_between(friction, ends[:, 0], ends[:, 1], color=PART_COLOURS["P2"], alpha=0.45, label="equilibrium")
+    for side in ends.T:
+        axes.plot(friction, side, color=darker(PART_COLOURS["P2"]), linewidth=1.2)
+    marks = zip(measured.items(), ("o", "s", "^", "D"), (INK, "#B5332E", "#4A4F9A", "#8A6D00"), strict=False)
+    for (name, distances), mark, colour in marks:
+        for distance in distances:
+            axes.axhline(distance, color=colour, linewidth=0.6, linestyle=":")
+        axes.plot([most] * len(distances), distances, mark, color=colour, clip_on=False, label=name)
+        needed = [(mu, value) for value in distances if (mu := finder.friction_for(value)) is not None and mu <= most]
+        axes.plot([mu for mu, _ in needed], [value for _, value in needed], mark, color=colour, fillstyle="none")
+    axes.set(xlim=(0.0, most), xlabel="friction in the grooves", ylabel="distance between the splints (mm)")
+    axes.legend(loc="upper left", frameon=False)
+    return figure

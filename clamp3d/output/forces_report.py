@@ -1,42 +1,32 @@
-"""Torque and friction of a clamp as text, and the friction band as a picture."""
+"""Torque and friction of a clamp as text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from clamp3d.clamp.friction import Band, FrictionBand
 from clamp3d.clamp.torque import Range, Tightening
-from clamp3d.output.figures import blank
-from clamp3d.output.palette import INK, PART_COLOURS, darker
 from clamp3d.output.tables import text_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def tightening_to_text(tight: Tightening) -> str:
     """What a torque does, as lines for a terminal."""
-    return "\n".join(_tightening(tight))
-
-
-def _tightening(tight: Tightening) -> Iterator[str]:
     preloads = ", ".join(f"{newton / 1e3:.1f} kN at friction {mu:.2f}" for mu, newton in tight.preloads)
-    yield f"torque {tight.torque:g} Nm: bolt preload {preloads} (VDI 2230; wire forces without friction in the grooves)"
-    rows = [
+    loads = [
         (f"{load.force.a}-{load.force.b}", _span(load.newton, 1e-3, 1), _span(load.line_load))
         for load in tight.contacts
     ]
-    yield text_table(("contact", "force (kN)", "line load (N/mm)"), rows, indent=2)
-    yield "  line load: force over the groove's length; strands are no solid bar, so no Hertz pressure is given"
-    for wire, pull in tight.slip.items():
-        yield f"  {wire} slips lengthwise at a pull of {_span(pull, 1e-3, 1)} kN"
-    for limit in tight.limits:
-        yield f"  {limit.limit}: reached at {_span(limit.torque, digits=1)} Nm"
-    rows = [(c.name, c.value, c.source) for c in tight.coefficients]
-    yield text_table(("coefficient", "value", "source"), rows, indent=2)
+    lines = [
+        f"torque {tight.torque:g} Nm: bolt preload {preloads} (VDI 2230; wire forces without friction in the grooves)",
+        text_table(("contact", "force (kN)", "line load (N/mm)"), loads, indent=2),
+        "  line load: force over the groove's length; strands are no solid bar, so no Hertz pressure is given",
+    ]
+    lines += [f"  {wire} slips lengthwise at a pull of {_span(s, 1e-3, 1)} kN" for wire, s in tight.slip.items()]
+    lines += [f"  {limit.limit}: reached at {_span(limit.torque, digits=1)} Nm" for limit in tight.limits]
+    coefficients = [(c.name, c.value, c.source) for c in tight.coefficients]
+    return "\n".join([*lines, text_table(("coefficient", "value", "source"), coefficients, indent=2)])
 
 
 def _span(span: Range | None, factor: float = 1.0, digits: int = 0) -> str:
@@ -69,33 +59,3 @@ def measured_to_text(finder: FrictionBand, bands: Sequence[Band], measured: floa
         else f"it needs a friction of at least {np.ceil(1e3 * least) / 1e3:.3f}"
     )
     return f"measured {measured:g} mm: {needs}; {where} (without friction {finder.distance:.3f} mm)"
-
-
-def friction_figure(finder: FrictionBand, measured: Mapping[str, Sequence[float]], *, most: float = 0.3) -> Figure:
-    """The friction band over the coefficient of friction, with measured splint distances beside it.
-
-    Parameters
-    ----------
-    finder : FrictionBand
-    measured : dict of sequences of float
-        Distances in mm by what they are; each group has its own mark at the right edge.
-    most : float
-        Up to which friction the band is drawn.
-    """
-    figure = blank(7.0, 4.6)
-    axes = figure.add_subplot()
-    friction = np.linspace(0.0, most, 61)
-    ends = np.array([(finder.distance,) * 2, *(finder.ends(float(mu)) for mu in friction[1:])])
-    axes.fill_between(friction, ends[:, 0], ends[:, 1], color=PART_COLOURS["P2"], alpha=0.45, label="equilibrium")
-    for side in ends.T:
-        axes.plot(friction, side, color=darker(PART_COLOURS["P2"]), linewidth=1.2)
-    marks = zip(measured.items(), ("o", "s", "^", "D"), (INK, "#B5332E", "#4A4F9A", "#8A6D00"), strict=False)
-    for (name, distances), mark, colour in marks:
-        for distance in distances:
-            axes.axhline(distance, color=colour, linewidth=0.6, linestyle=":")
-        axes.plot([most] * len(distances), distances, mark, color=colour, clip_on=False, label=name)
-        needed = [(mu, value) for value in distances if (mu := finder.friction_for(value)) is not None and mu <= most]
-        axes.plot([mu for mu, _ in needed], [value for _, value in needed], mark, color=colour, fillstyle="none")
-    axes.set(xlim=(0.0, most), xlabel="friction in the grooves", ylabel="distance between the splints (mm)")
-    axes.legend(loc="upper left", frameon=False)
-    return figure

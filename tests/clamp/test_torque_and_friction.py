@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from legends import friction_figure
 from scipy.optimize import brentq, linprog
 
 from clamp3d import InputError, assemble, load_clamp
@@ -17,7 +18,7 @@ from clamp3d.clamp.dimensions import Limits
 from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.torque import tighten, torque_per_newton
-from clamp3d.output.forces_report import friction_figure, measured_to_text
+from clamp3d.output.forces_report import measured_to_text
 
 REFERENCE = load_clamp()
 
