@@ -140,6 +140,7 @@ def test_a_clashing_scene_says_so_worst_first(tmp_path):
     assert 0.0 < float(hit["volume_at_least_mm3"]) <= float(hit["volume_at_most_mm3"])
     assert float(hit["box_y_min"]) <= float(hit["inside_y"]) <= float(hit["box_y_max"])
     assert "<i>clash" not in page
+    assert page.count("--c:#") == page.count("--c:") > 0  # a clear cell of the matrix has its colour too
     assert len(pictures(page)) == 1 + len(found.findings)
     ids = set(re.findall(r'id="([^"]*)"', page))
     assert {s[1:] for s in sources(page) if s.startswith("#")} <= {i.replace("&#39;", "'") for i in ids}
