@@ -9,7 +9,7 @@ import click
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
-from clamp3d.cli.options import SEQUENCE, UNITS, Source, command, option
+from clamp3d.cli.options import SEQUENCE, UNITS, Quiet, Source, command, option
 from clamp3d.cli.terminal import bar, finish, show
 from clamp3d.engine.check import check
 from clamp3d.engine.result import CheckResult
@@ -18,7 +18,7 @@ from clamp3d.output.export import FORMATS, Format, Layout, default_layout, desti
 
 
 @command("export")
-class Export(Source):
+class Export(Source, Quiet):
     """Write the parts of INPUT for CAD review, with a manifest beside them.
 
     INPUT is a clamp (a built-in name or a TOML file), a scene file, or a file with parts. Prints the paths of the
@@ -49,7 +49,6 @@ class Export(Source):
     mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM")
     clashes: bool = option("Check the parts, and add what clashing parts have in common as red bodies.", "--clashes")
     file_unit: str | None = option("Unit of the file.  [default: mm; m for glb]", "--unit", type=click.Choice(UNITS))
-    quiet: bool = option("No messages.", "--quiet", "-q")
 
     def run(self) -> None:
         """Place the parts and write them."""

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, UNITS, argument, command, option
+from clamp3d.cli.options import JSON, UNITS, Quiet, argument, command, option
 from clamp3d.cli.terminal import bar, save, show
 from clamp3d.fit.fit import fit_file
 from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
 
 @command("fit")
-class Fit:
+class Fit(Quiet):
     """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) each with its error bound.
 
     A mesh without any is no error: exit code 0.
@@ -25,7 +25,6 @@ class Fit:
     )
     json_file: Path | None = JSON
     html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html")
-    quiet: bool = option("No progress and no notes.", "--quiet", "-q")
 
     def run(self) -> None:
         """Fit, print and write."""

@@ -14,12 +14,13 @@ import click
 from click.shell_completion import CompletionItem
 
 from clamp3d.baselines import METHODS, contact_model
-from clamp3d.cli.terminal import STDOUT_TAKEN
+from clamp3d.cli.terminal import STDOUT_TAKEN, narrator, show
 from clamp3d.errors import need
 
 if TYPE_CHECKING:
     from clamp3d.baselines.model import ContactModel
     from clamp3d.clamp.dimensions import Clamp
+    from clamp3d.clamp.result import Assembly, Waypoint
     from clamp3d.engine.scene import Scene
     from clamp3d.geometry.shapes import Fit
 
@@ -82,13 +83,12 @@ class Output(click.Path):
 
 
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
-OUTPUT = Output()
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
 _USUAL: dict[str, dict[str, Any]] = {
     "bool": {"is_flag": True},
     "float": {"type": number},
-    "Path": {"type": OUTPUT, "metavar": "FILE"},
+    "Path": {"type": Output(), "metavar": "FILE"},
 }
 
 
@@ -175,9 +175,30 @@ JSON = option("Write the result as JSON; - is stdout.", "--json")
 
 
 class Quiet:
-    """Whether progress is shown."""
+    """Whether progress and notes are shown."""
 
-    quiet: bool = option("No progress.", "--quiet", "-q")
+    quiet: bool = option("No progress and no notes.", "--quiet", "-q")
+
+    def assemble(
+        self, clamp: Clamp, model: ContactModel, settings: Mapping[str, Any], *listeners: Callable[[Waypoint], None]
+    ) -> Assembly:
+        """Assemble a clamp; every waypoint goes to stderr and to the ``listeners``."""
+        from clamp3d.clamp.assemble import assemble
+
+        def listen(waypoint: Waypoint) -> None:
+            for listener in listeners:
+                listener(waypoint)
+            if not self.quiet:
+                show(f"{waypoint.step:14s} {waypoint.label}", err=True)
+
+        with narrator(self.quiet) as say:
+            return assemble(
+                clamp,
+                model,
+                on_waypoint=listen,
+                progress=lambda tried, distance: say(f"closing: {tried} positions tried, {distance:.3f} mm"),
+                **settings,
+            )
 
 
 class ClampSource:
@@ -282,23 +303,3 @@ class Method(Quiet):
 
         settings: dict[str, Any] = {key: getattr(self, key) for key in ("unit_angle", "threshold", "mesh_error")}
         return contact_model(self.method, parts(clamp), progress=False if self.quiet else None, **settings)
-
-
-class Viewing(Quiet):
-    """What a viewer is to show, and where."""
-
-    html_file: Path | None = option("Write one page with the whole animation.", "--html")
-    url: str | None = option("Use a running meshcat server: the zmq_url that it printed.", metavar="ZMQ_URL")
-    host: str = option("Address to serve on; 0.0.0.0 for all.", default="127.0.0.1")
-    port: int | None = option("Port to serve on.  [default: first free from 7000]", type=click.IntRange(0, 65535))
-    timeout: float | None = option("Stop serving after S seconds.", type=click.FloatRange(min=0.0), metavar="S")
-    open_browser: bool = option("Open the page in a browser.", "--open")
-    overlays: tuple[str, ...] = option(
-        "Also draw a baseline's approximation of the parts: wedges (unit angle in deg) or hulls (CoACD's threshold "
-        "in mm). May be given more than once.",
-        "--overlay",
-        multiple=True,
-        metavar="NAME[=SIZE]",
-    )
-    draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
-    clearance: float | None = CLEARANCE

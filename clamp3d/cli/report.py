@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.cli.options import CLEARANCE, FOLDER, Method, Source, command, option
-from clamp3d.cli.terminal import finish, narrated, narrator, show
+from clamp3d.cli.terminal import finish, narrator, show
 from clamp3d.errors import need
 
 
@@ -34,7 +34,7 @@ class Report(Source, Method):
         loaded = self.load()
         if not isinstance(loaded, Clamp):
             self.refuse_method()
-        subject = narrated(loaded, self.model(loaded), settings, self.quiet) if isinstance(loaded, Clamp) else loaded
+        subject = self.assemble(loaded, self.model(loaded), settings) if isinstance(loaded, Clamp) else loaded
         with narrator(self.quiet) as narrate:
             review = make_report(subject, clearance=self.clearance, progress=narrate)
             paths = write_report(review, self.output, progress=narrate)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from clamp3d.cli.options import JSON, ClampSource, Method, Viewing, command, number, option
-from clamp3d.cli.terminal import finish, narrated, save, show
+from clamp3d.cli.options import JSON, ClampSource, Method, command, number, option
+from clamp3d.cli.terminal import finish, save, show
+from clamp3d.cli.view import Viewing
 from clamp3d.errors import SequenceError
 from clamp3d.output.run_report import run_to_text
 
@@ -98,16 +99,13 @@ class Run(ClampSource, Method, Mechanics, Viewing):
         settings = self.settings(self.equilibria)
         self.check_mechanics(settings["solver"])
         clamp = self.clamp()
-        model, page = self.model(clamp), None
-        if self.view or self.html_file is not None or self.url is not None:
-            from clamp3d.cli.viewing import Page  # meshcat, for a page alone
-
-            page = Page(self, serve=self.view)
+        model = self.model(clamp)
+        has_page = self.view or self.html_file is not None or self.url is not None
         try:
-            if page is not None:
-                result = page.assemble(clamp, model, settings, self._show)
+            if has_page:
+                result = self.view_assembly(clamp, model, settings, serve=self.view, done=self._show)
             else:
-                result = narrated(clamp, model, settings, self.quiet)
+                result = self.assemble(clamp, model, settings)
                 self._show(result)
         except SequenceError as error:
             data: dict[str, Any] = {
@@ -116,8 +114,8 @@ class Run(ClampSource, Method, Mechanics, Viewing):
             }
             show(data["status"])
             save(self.json_file, lambda: data)
-            if page is not None:
-                page.check(error.scene)
+            if has_page:
+                self.view_scene(error.scene, serve=self.view)
             finish(True)
         finish(not result.passed)
 

@@ -12,16 +12,11 @@ from contextlib import contextmanager, suppress
 from enum import IntEnum
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import click
 
 from clamp3d.errors import escaped
-
-if TYPE_CHECKING:
-    from clamp3d.baselines.model import ContactModel
-    from clamp3d.clamp.dimensions import Clamp
-    from clamp3d.clamp.result import Assembly, Waypoint
 
 
 class ExitCode(IntEnum):
@@ -129,32 +124,6 @@ def narrator(quiet: bool) -> Iterator[Callable[[str], None]]:
 
     with Console(stderr=True).status("") as status:
         yield lambda text: status.update(Text(escaped(text)))
-
-
-def narrated(
-    clamp: Clamp,
-    model: ContactModel,
-    settings: dict[str, Any],
-    quiet: bool,
-    *listeners: Callable[[Waypoint], None],
-) -> Assembly:
-    """Assemble a clamp with the waypoints on stderr, and to ``listeners``."""
-    from clamp3d.clamp.assemble import assemble
-
-    def listen(waypoint: Waypoint) -> None:
-        for listener in listeners:
-            listener(waypoint)
-        if not quiet:
-            print(escaped(f"{waypoint.step:14s} {waypoint.label}"), file=sys.stderr)
-
-    with narrator(quiet) as say:
-        return assemble(
-            clamp,
-            model,
-            on_waypoint=listen,
-            progress=lambda tried, distance: say(f"closing: {tried} positions tried, {distance:.3f} mm"),
-            **settings,
-        )
 
 
 @contextmanager
