@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import (
     INPUT_FILE,
     JSON,
@@ -22,14 +22,11 @@ from clamp3d.cli.options import (
 from clamp3d.cli.terminal import bar, finish, save, show
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.check import check
-from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.output.baseline import compare, groups_csv
 from clamp3d.output.groups import accept, accepted_file, grouped, read_accepted
 from clamp3d.output.scene_report import check_to_dict, check_to_text
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.result import Assembly
+from clamp3d.scenefile.check import opened
 
 
 def name_pairs(text: str) -> list[tuple[str, str]]:
@@ -83,7 +80,9 @@ class Check(Source, Quiet):
 
     def run(self) -> None:
         """Check, print and write."""
-        scene, assembled = self._scene()
+        subject = opened(self.load())
+        assembled = subject if isinstance(subject, Assembly) else None
+        scene = subject.scene if isinstance(subject, Assembly) else subject
         clearance = scene.clearance if self.clearance is None else self.clearance
         scene = replace(scene, clearance=clearance, allowed=(*scene.allowed, *self.allow))
         accepted = read_accepted(accepted_file(self.source))
@@ -98,7 +97,7 @@ class Check(Source, Quiet):
             status = {"status": assembled.status}
             errors = (f.text for f in assembled.findings if f.severity == "error" and f.text != assembled.status)
             show("\n".join([assembled.status, *errors]))
-        show(check_to_text(result, comparison, accepted))
+        show(check_to_text(result, comparison))
         save(self.json_file, lambda: check_to_dict(result, comparison) | status)
         save(self.csv_file, lambda: groups_csv(groups, comparison))
         if self.html_file is not None:
@@ -113,16 +112,6 @@ class Check(Source, Quiet):
         finish(assembled is not None and not assembled.passed, verdicts=verdicts)
         if not result.work.pairs:
             raise InputError("there are no two parts to check")
-
-    def _scene(self) -> tuple[Scene, Assembly | None]:
-        """The scene to check, and the clamp that it is of."""
-        loaded = self.load()
-        if isinstance(loaded, Scene):
-            return loaded, None
-        from clamp3d.clamp.assemble import assemble  # takes long to import, and most scenes need none of it
-
-        run = assemble(loaded)
-        return run.scene, run
 
 
 @command("accept")

@@ -80,7 +80,7 @@ def exploded_poses(clamp: Clamp) -> dict[PartName, SectionPose]:
 def steps_figure(run: Assembly) -> Figure:
     """Each step of the sequence where it ends: in the view (upper row) and in the section (lower)."""
     instance("run", run, Assembly)
-    ends = step_ends(run)
+    ends = list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
     figure = blank(3.1 * len(ends), 7.4)
     axes = figure.subplots(2, len(ends), squeeze=False, height_ratios=(1.0, 1.2))
     start = 0
@@ -97,11 +97,6 @@ def steps_figure(run: Assembly) -> Figure:
     same_scale(axes[0])
     same_scale(axes[1])
     return figure
-
-
-def step_ends(run: Assembly) -> list[tuple[str, int]]:
-    """Each step of the sequence with the index of its last waypoint in ``run.path``, in order."""
-    return list({waypoint.step: i for i, waypoint in enumerate(run.path)}.items())
 
 
 def _arrows(ax: Axes, clamp: Clamp, path: Sequence[Poses], shown: Iterable[PartName]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -39,6 +39,8 @@ class Comparison:
         Of each group by its identifier: "new" where a pair of it is, "changed" where one stands otherwise now.
     changed : mapping
         The new and changed pairs of each group.
+    accepted : mapping
+        What somebody has accepted, by the identifiers of groups.
     gone : tuple of dict
         The earlier groups, as the JSON has them, with the pairs that are no finding any more.
     moved : mapping
@@ -48,8 +50,9 @@ class Comparison:
 
     status: Mapping[str, Status]
     changed: Mapping[str, tuple[Names, ...]]
+    accepted: Mapping[str, Accepted]
     gone: tuple[Mapping[str, Any], ...] = ()
-    moved: Mapping[str, float] | None = None
+    moved: Mapping[str, float] = field(default_factory=dict)
     has_baseline: bool = False
 
     def open(self, groups: Iterable[Group]) -> list[Group]:
@@ -59,14 +62,18 @@ class Comparison:
 
 
 def compare(
-    scene: Scene, groups: Sequence[Group], baseline: Path | None, accepted: Mapping[str, Accepted]
+    scene: Scene,
+    groups: Sequence[Group],
+    baseline: Path | None = None,
+    accepted: Mapping[str, Accepted] | None = None,
 ) -> Comparison:
     """Compare groups with those of a result that ``check --json`` wrote. Raises InputError if it holds none.
 
     A pair is new too where it was no clash in the earlier check and is one now, whatever group it was in.
     """
+    accepted = accepted or {}
     if baseline is None:
-        return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {})
+        return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {}, accepted)
     before = Baseline.read(baseline)
     earlier = {key for _, keys in before.groups for key in keys}
     status: dict[str, Status] = {}
@@ -89,7 +96,7 @@ def compare(
         lost = [pair for pair, key in zip(old["pairs"], keys, strict=True) if key not in now]
         if lost:
             gone.append({**old, "pairs": lost, "count": len(lost)})
-    return Comparison(status, changed, tuple(gone), before.moved(scene), True)
+    return Comparison(status, changed, accepted, tuple(gone), before.moved(scene), True)
 
 
 def _keys(pairs: Iterable[Sequence[str]], motion: str | None, verdict: str) -> list[Key]:

@@ -16,7 +16,7 @@ from clamp3d.output.files import whole_file
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.pages import now
 from clamp3d.output.scene_figures import finding_figure, view_of
-from clamp3d.output.wording import group_sentence, group_text, titles
+from clamp3d.output.wording import group_text, sentence, titles
 
 _TOPICS = 200
 """Groups that get a topic at most, the first ones: each has a picture, which takes half a second."""
@@ -54,7 +54,7 @@ def _markup(result: CheckResult, group: Group, index: int) -> Element:
     pairs = ", ".join(f"{row.a} and {row.b}" for row in group.rows)
     topic = _element(
         "Topic",
-        _element("Title", group_sentence(group, names)),
+        _element("Title", sentence(group.rows, names, group.a, group.b)),
         _element("Index", str(index)),
         _element("Labels", group.id),
         _element("CreationDate", f"{now():%Y-%m-%dT%H:%M:%SZ}"),

@@ -18,13 +18,17 @@ from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.files.formats import UNITS_MM
+from clamp3d.files.open_cascade import bounds_of, moved, occ, to_bytes, volume_of
+from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.profile import check_mesh_error
+from clamp3d.geometry.shapes import MeshShape
 from clamp3d.output import mesh_formats
 from clamp3d.output.files import file_stem, write_files
 from clamp3d.output.manifest import manifest
-from clamp3d.output.placed import PlacedPart, PosedMesh, place, posed
-from clamp3d.output.shared_bodies import shared_bodies
-from clamp3d.output.step import step
+from clamp3d.output.palette import VERDICT_COLOURS
+from clamp3d.output.placed import PlacedPart, PosedMesh, overlap, place, posed
+from clamp3d.output.step import exact_solid, step
 from clamp3d.scenefile.check import opened
 
 Format: TypeAlias = Literal["stl", "obj", "ply", "glb", "3mf", "step"]
@@ -130,7 +134,7 @@ def export(
     shown, state_settings = _at_state(source, state)
     placed = tuple(_coloured(place(shown, names), result))
     if result is not None:
-        placed += tuple(shared_bodies(result, placed, settings["mesh_error_mm"]))
+        placed += tuple(_shared_bodies(result, placed, settings["mesh_error_mm"]))
     meshed = [] if settings["format"] == "step" else posed(placed, mesh_error)
     clamp = source if isinstance(source, Clamp) else source.clamp if isinstance(source, Assembly) else None
     files = _files(settings, file, source.name if clamp is None else clamp.name, placed, meshed)
@@ -203,6 +207,34 @@ def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Itera
             yield replace(item, component=replace(component, face_colours={}))
         else:
             yield replace(item, colour=component.colour or colours.setdefault(id(item.shape), item.colour))
+
+
+def _shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error: float | None) -> list[PlacedPart]:
+    """The common part of each two of the ``placed`` parts that clash at rest, in the world, in red.
+
+    Of the facets within ``mesh_error`` mm, or with exact faces where that is None. Pairs whose common part has no
+    volume are left out.
+    """
+    parts = {part.name: part for part in placed}
+    rows = [row for row in result.pairs if row.verdict in BAD and {row.a, row.b} <= parts.keys()]
+    bodies = []
+    for row in rows:
+        name, (a, b) = f"clash {row.a} - {row.b}", (parts[row.a], parts[row.b])
+        shape = _exact_common(name, a, b) if mesh_error is None else _faceted_common(name, a, b, mesh_error)
+        if shape is not None:
+            bodies.append(PlacedPart(name, shape, np.eye(4), VERDICT_COLOURS["clash"]))
+    return bodies
+
+
+def _exact_common(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
+    shape: Any = occ.BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in (a, b))).Shape()
+    volume = volume_of(shape)
+    return BrepSolid(name, to_bytes(shape), bounds_of(shape), volume) if volume > 0.0 else None
+
+
+def _faceted_common(name: str, a: PlacedPart, b: PlacedPart, mesh_error: float) -> MeshShape | None:
+    common = overlap(*posed([a, b], mesh_error))
+    return None if common is None else MeshShape(make_mesh(common.vertices, common.faces), name=name)
 
 
 def _files(

@@ -93,7 +93,6 @@ def fit_to_html(result: FitResult) -> str:
         point=_point,
         direction=_direction,
         short=_short,
-        degrees=math.degrees,
         data=json.dumps(data),
     )
 

@@ -123,15 +123,11 @@ def _alike(rows: Sequence[PairResult]) -> list[list[PairResult]]:
     latest: dict[Verdict, list[PairResult]] = {}
     for row in rows:
         own = latest.get(row.verdict)
-        if own is None or _jumps(own[-1].distance.upper, row.distance.lower):
+        if own is None or row.distance.lower > (last := own[-1].distance.upper) + max(_JUMP, _JUMP_SHARE * abs(last)):
             own = latest[row.verdict] = []
             alike.append(own)
         own.append(row)
     return alike
-
-
-def _jumps(last: float, next_at_least: float) -> bool:
-    return next_at_least > last + max(_JUMP, _JUMP_SHARE * abs(last))
 
 
 def _group(scene: Scene, rows: Sequence[PairResult], family: Mapping[str, str]) -> Group:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 import os
 from functools import cache
 from typing import Any
@@ -33,10 +34,14 @@ def now() -> datetime.datetime:
 def _environment(package: str) -> Any:
     import jinja2
 
-    return jinja2.Environment(
+    from clamp3d.output.wording import counted, distance_text, first_text
+
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "templates"),
         autoescape=jinja2.select_autoescape(["html"]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.globals |= {"gap": distance_text, "first_text": first_text, "counted": counted, "degrees": math.degrees}
+    return environment

@@ -11,6 +11,7 @@ from clamp3d import __version__
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.capture import Outcome
 from clamp3d.clamp.closing import open_start
+from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.placement import Limits, Placement
 from clamp3d.clamp.section import Section
 from clamp3d.output.figures import blank, title
@@ -82,15 +83,7 @@ def placement_to_dict(placed: Placement) -> dict[str, Any]:
         "counts": _counts(placed),
         "captured_mm": capture.captured,
         "seat_tolerance_mm": placed.seat_tolerance,
-        "limits": [
-            {
-                "turn": limit.turn,
-                "low_deg": math.degrees(limit.low),
-                "high_deg": math.degrees(limit.high),
-                "searched_deg": math.degrees(limit.reach),
-            }
-            for limit in placed.limits
-        ],
+        "limits": [plain(limit, low="low_deg", high="high_deg", reach="searched_deg") for limit in placed.limits],
     }
 
 

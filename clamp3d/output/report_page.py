@@ -7,19 +7,17 @@ import json
 import math
 import platform
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
-from clamp3d.engine.verdict import Verdict
 from clamp3d.output.files import write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import DIMENSION, INK, VERDICT_COLOURS, part_colours
-from clamp3d.output.report import LISTED, SEVERITIES, Finding, PairRow, Report
+from clamp3d.output.report import LISTED, SEVERITIES, PairRow, Report
 from clamp3d.output.tables import csv_table
-from clamp3d.output.wording import distance_text, first_text, meaning, titles
+from clamp3d.output.wording import meanings, titles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,7 +82,11 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         "settings": report.settings,
         "headline": report.headline,
         "passed": report.passed,
-        "findings": [_finding_to_dict(finding) for finding in report.findings],
+        "findings": [
+            {"severity": f.severity, "text": f.text}
+            | ({"id": f.group.id, "count": len(f.group.rows)} if f.group else {})
+            for f in report.findings
+        ],
         "pairs": [_pair_to_dict(row) for row in report.rows],
         "motions": [_pair_to_dict(row) for row in report.motions],
         "modelled": report.modelled,
@@ -124,22 +126,17 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda step
     return render(
         "report.html",
         report=report,
-        scene=report.scene,
-        assembly=report.assembly,
         made=f"{now():%Y-%m-%d %H:%M} UTC",
         versions=_versions(),
-        gap=distance_text,
-        first_text=first_text,
         bound=lambda value: f"{value:.1e}" if math.isfinite(value) else "unknown",
         vector=lambda v: "" if v is None else ", ".join(f"{x:z.3f}" if abs(x) >= 5e-4 else "0" for x in v),
-        degrees=math.degrees,
         pictures=_pictures(report, progress),
         shown=[row for row in report.rows if len(report.rows) <= LISTED or row.verdict != "clear"],
         names=names,
         titles=titles(report.scene),
         colours=part_colours([part.name for part in report.scene.parts]),
         verdict_colours=VERDICT_COLOURS,
-        verdicts={verdict.value: meaning(verdict.value, report.scene) for verdict in Verdict},
+        verdicts=meanings(report.scene),
         severities=SEVERITIES,
         cell=lambda a, b: cells.get((a, b)),
     )
@@ -157,36 +154,32 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
     from clamp3d.output.scene_figures import finding_figure, scene_figure
 
     scene, assembly = report.scene, report.assembly
-    jobs: list[tuple[str, str, Callable[[], Figure], PairRow | None]] = []
+    out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
+
+    def add(kind: str, name: str, figure: Callable[..., Figure], *shown: Any, row: PairRow | None = None) -> None:
+        progress(f"picture of {name}")
+        out[kind].append((_data_address(figure(*shown)), row))
+
     if assembly is not None:
-        jobs.append(("overview", "the states", partial(states_figure, assembly), None))
-        jobs.append(("steps", "the steps", partial(steps_figure, assembly), None))
+        add("overview", "the states", states_figure, assembly)
+        add("steps", "the steps", steps_figure, assembly)
         for row in report.rows:
             # Every pair that touches, overlaps, or is declared to; a thread has nothing to show.
             if row.contact is not None and (row.contact.type or row.contact.declared) > 1:
-                jobs.append(("pairs", row.name, partial(contact_figure, assembly, row.contact), row))
+                add("pairs", row.name, contact_figure, assembly, row.contact, row=row)
     elif scene.parts:
-        rows = [finding.row for finding in report.findings if finding.row is not None]
-        marks = [(number, row) for number, row in enumerate(rows, 1)]
-        jobs.append(("overview", "the scene", partial(scene_figure, scene, marks[:PICTURES]), None))
-        jobs += [("pairs", row.name, partial(finding_figure, scene, row), row) for row in rows[:PICTURES]]
-    out: dict[str, list[tuple[str, PairRow | None]]] = {"overview": [], "steps": [], "pairs": []}
-    for kind, name, draw, pair in jobs:
-        progress(f"picture of {name}")
-        out[kind].append((_data_address(draw()), pair))
+        rows = [finding.row for finding in report.findings if finding.row is not None][:PICTURES]
+        add("overview", "the scene", scene_figure, scene, [*enumerate(rows, 1)])
+        for row in rows:
+            add("pairs", row.name, finding_figure, scene, row, row=row)
     return out
 
 
 def _data_address(figure: Figure) -> str:
-    from clamp3d.output.figures import picture as drawn
+    from clamp3d.output.figures import picture
 
-    picture = drawn(figure, "svg").replace(b"</style>", f"{_DARK}</style>".encode(), 1)
-    return "data:image/svg+xml;base64," + base64.b64encode(picture).decode("ascii")
-
-
-def _finding_to_dict(finding: Finding) -> dict[str, Any]:
-    group = {} if finding.group is None else {"id": finding.group.id, "count": len(finding.group.rows)}
-    return {"severity": finding.severity, "text": finding.text} | group
+    svg = picture(figure, "svg").replace(b"</style>", f"{_DARK}</style>".encode(), 1)
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:

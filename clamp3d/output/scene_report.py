@@ -11,8 +11,8 @@ from clamp3d import __version__
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.result import CheckResult, Work
 from clamp3d.engine.verdict import Verdict
-from clamp3d.output.baseline import Comparison
-from clamp3d.output.groups import Accepted, Group, grouped
+from clamp3d.output.baseline import Comparison, compare
+from clamp3d.output.groups import Group, grouped
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import (
     by_group,
@@ -30,32 +30,29 @@ _LISTED, _PAIRS, _NOTES = 60, 30, 12
 
 def check_to_dict(result: CheckResult, comparison: Comparison | None = None) -> dict[str, Any]:
     """The result as JSON data; lengths in mm. Pairs that are not listed are clear."""
-    groups = [group.to_dict() for group in grouped(result)]
-    if comparison is not None:
-        groups = [
-            group | {"status": comparison.status[group["id"]], "changed": comparison.changed.get(group["id"], ())}
-            for group in groups
-        ]
+    comparison = comparison or compare(result.scene, grouped(result))
+    groups = [
+        g.to_dict() | {"status": comparison.status[g.id], "changed": comparison.changed.get(g.id, ())}
+        for g in grouped(result)
+    ]
     data: dict[str, Any] = {"clamp3d": __version__, "headline": headline(result), "groups": groups}
-    if comparison is not None and comparison.has_baseline:
+    if comparison.has_baseline:
         data["gone"] = list(comparison.gone)
-        data["moved_mm"] = {name: mm if math.isfinite(mm) else None for name, mm in (comparison.moved or {}).items()}
+        data["moved_mm"] = {name: mm if math.isfinite(mm) else None for name, mm in comparison.moved.items()}
     data["rules"] = [{"rule": str(rule), "pairs": count} for rule, count in _rules(result).items()]
     return data | result.to_dict() | {"work": asdict(result.work)}
 
 
-def check_to_text(
-    result: CheckResult, comparison: Comparison | None = None, accepted: Mapping[str, Accepted] | None = None
-) -> str:
+def check_to_text(result: CheckResult, comparison: Comparison | None = None) -> str:
     """The result as lines for a terminal: the headline, the groups of findings, the pairs, the motions."""
+    comparison = comparison or compare(result.scene, grouped(result))
     lines = [f"{result.scene.name}: {headline(result)}", _counts(result)]
     lines += _cut([f"  note: {note}" for note in result.scene.notes], _NOTES, "more notes (--json lists all)")
     rules = [f"  allowed: {rule}, {counted(count, 'pair')}" for rule, count in _rules(result).items()]
     lines += _cut(rules, _NOTES, "more rules")
-    if comparison is not None:
-        lines += comparison_text(comparison)
-    lines += _cut(_findings(result, comparison, accepted or {}), _LISTED, "more (--json or --html lists all)")
-    others = {*(accepted or {})} - {group.id for group in grouped(result)}
+    lines += comparison_text(comparison)
+    lines += _cut(_findings(result, comparison), _LISTED, "more (--json or --html lists all)")
+    others = comparison.accepted.keys() - comparison.status.keys()
     lines += [f"  note: accepted, and no finding now: {', '.join(sorted(others))}"] if others else []
     if result.pairs:
         rows = [
@@ -88,7 +85,7 @@ def comparison_text(comparison: Comparison) -> list[str]:
         f"  gone: {', '.join(_cut([f'{a} and {b}' for a, b in old['pairs']], _NOTES, 'more'))}: {old['verdict']}"
         for old in comparison.gone
     ]
-    return [summary, *_moved(comparison.moved or {}), *gone]
+    return [summary, *_moved(comparison.moved), *gone]
 
 
 def _moved(moved: Mapping[str, float]) -> list[str]:
@@ -112,22 +109,21 @@ def _counts(result: CheckResult) -> str:
     )
 
 
-def _findings(result: CheckResult, comparison: Comparison | None, accepted: Mapping[str, Accepted]) -> list[str]:
+def _findings(result: CheckResult, comparison: Comparison) -> list[str]:
     """A line for each group; what merely touches at rest, as before, is in the table of pairs."""
     names = titles(result.scene)
 
     def line(group: Group) -> str:
-        status: str = "" if comparison is None else comparison.status[group.id]
-        if status == "accepted" and (entry := accepted.get(group.id)):
+        status: str = comparison.status[group.id] if comparison.has_baseline else ""
+        if entry := comparison.accepted.get(group.id):
             status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
-        shown = comparison is not None and (comparison.has_baseline or status.startswith("accepted"))
-        pairs = [] if comparison is None else comparison.changed.get(group.id, ())
+        pairs = comparison.changed.get(group.id, ())
         which = _cut([f"{a} and {b}" for a, b in pairs], _NOTES, "more")
         changed = f"; changed: {', '.join(which)}" if 0 < len(pairs) < len(group.rows) else ""
-        return f"  {f'{status}: ' if shown else ''}{group_text(group, names)}{changed}; id {group.id}"
+        return f"  {status}{': ' if status else ''}{group_text(group, names)}{changed}; id {group.id}"
 
     def matters(group: Group) -> bool:
-        differs = comparison is not None and comparison.has_baseline and comparison.status[group.id] != "same"
+        differs = comparison.has_baseline and comparison.status[group.id] != "same"
         return group.verdict is not Verdict.CONTACT or group.motion is not None or differs
 
     return [line(group) for group in grouped(result) if matters(group)]

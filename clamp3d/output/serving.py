@@ -81,50 +81,54 @@ class CommandLog:
             return {"messages": self.messages(since), "count": self._count}
 
 
-class PageServer:
+class PageServer(ThreadingTCPServer):
     """Serves a page at ``url``, in a thread, until it is closed: the page itself, its commands, and its questions.
 
     A request under a foreign name is refused: a page elsewhere whose name is pointed here may not read along.
     Raises InputError if a ``port`` that was named, or every port from 7000 on, is taken, or ``host`` is not ours.
     """
 
+    allow_reuse_address = daemon_threads = True
+
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
-        names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
-        self._server = _bind(host, port, names)
-        self.port: int = self._server.socket.getsockname()[1]
+        self.names = {"localhost", text("host", host).lower(), socket.gethostname().lower()}
+        self.replies, self.questions = dict[str, Answer](), threading.Lock()
+        if port is not None:
+            whole("port", port, least=0, most=65535)
+        ports = range(PORT, PORT + PORTS) if port is None else (port,)
+        for candidate in ports:
+            try:
+                self.address_family = socket.getaddrinfo(host or "(none)", candidate, type=socket.SOCK_STREAM)[0][0]
+                super().__init__((host, candidate), _Handler)
+                break
+            except (OSError, ValueError) as error:
+                reason = getattr(error, "strerror", None) or str(error)
+                if candidate == ports[-1] or getattr(error, "errno", None) != errno.EADDRINUSE:
+                    where = f"from {PORT} to {PORT + PORTS - 1}" if port is None else f"port {port}"
+                    advice = "" if port is None else "; leave --port out to take a free one"
+                    raise InputError(f"cannot serve the viewer on {host!r} {where}: {reason}{advice}") from None
+        self.port: int = self.socket.getsockname()[1]
         self.url = f"http://{host}:{self.port}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), name="clamp3d viewer")
+        self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="clamp3d viewer", daemon=True)
 
     def start(self, page: Callable[[], str], log: CommandLog, answer: Answer) -> None:
         """Serve ``page()``, which follows the commands in ``log`` and whose questions ``answer`` answers."""
-        self._server.replies = {"/": lambda query: page(), "/commands": log.news, "/answer": answer}
-        self._thread.daemon = True
+        self.replies |= {"/": lambda query: page(), "/commands": log.news, "/answer": answer}
         self._thread.start()
 
     def close(self) -> None:
         """Stop listening and end the thread. A second call does nothing."""
         if self._thread.is_alive():
-            self._server.shutdown()
+            self.shutdown()
             self._thread.join()
-        self._server.server_close()
-
-
-class _Server(ThreadingTCPServer):
-    """Listens at an address under ``names``; ``replies`` are what is served at each place, as text or as data."""
-
-    allow_reuse_address = daemon_threads = True
-
-    def __init__(self, host: str, port: int, names: set[str]) -> None:
-        self.names, self.replies, self.questions = names, dict[str, Answer](), threading.Lock()
-        self.address_family = socket.getaddrinfo(host or "(none)", port, type=socket.SOCK_STREAM)[0][0]
-        super().__init__((host, port), _Handler)
+        self.server_close()
 
     def handle_error(self, *_: object) -> None:
         """A page that went away before it had its reply is no error."""
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
+    server: PageServer
 
     def do_GET(self) -> None:
         name = urlsplit(f"//{self.headers.get('Host', '')}").hostname or ""
@@ -159,22 +163,6 @@ def _is_address(name: str) -> bool:
     with contextlib.suppress(ValueError):
         return bool(ipaddress.ip_address(name))
     return False
-
-
-def _bind(host: str, port: int | None, names: set[str]) -> _Server:
-    """A server on ``port``, or on the first free one. Raises InputError if there is none."""
-    if port is not None:
-        whole("port", port, least=0, most=65535)
-    for candidate in range(PORT, PORT + PORTS) if port is None else (port,):
-        try:
-            return _Server(host, candidate, names)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            if getattr(error, "errno", None) != errno.EADDRINUSE:
-                break
-    where = f"from {PORT} to {PORT + PORTS - 1}" if port is None else f"port {port}"
-    advice = "" if port is None else "; leave --port out to take a free one"
-    raise InputError(f"cannot serve the viewer on {host!r} {where}: {reason}{advice}")
 
 
 class MeshcatServer:

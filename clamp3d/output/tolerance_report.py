@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -30,43 +29,35 @@ def shares(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, float
 
 def tolerance_to_text(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str = "") -> str:
     """Table of sensitivities, percentiles, and what does not clamp; ``note`` stands where there are no ``rows``."""
-    return "\n".join(_lines(result, rows, note))
-
-
-def _lines(result: MonteCarlo, rows: tuple[Sensitivity, ...], note: str) -> Iterator[str]:
-    tolerance = dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
+    spec, tolerance = result.spec, dict(zip(DIMENSIONS, result.spec.tolerance, strict=True))
     variance = shares(result, rows)
     total = sum(variance.values())
     n, m, unproven = len(result.status), len(result.clamped), result.unproven
     nominal = result.nominal_status if result.nominal is None else f"{result.nominal:.4f} mm"
-    yield f"clamp {result.spec.clamp.name}: splint distance {nominal}"
-    yield (
-        note
-        if not rows
-        else text_table(
-            ("dimension", "mm", "+-mm", "mm per mm", "variance"),
-            [
-                (
-                    row.name,
-                    f"{row.value:.4f}",
-                    f"{tolerance[row.name]:.4f}",
-                    f"{row.derivative:+.5f}",
-                    f"{100 * variance[row.name] / total:.1f} %" if total > 0.0 else None,
-                )
-                for row in rows
-            ],
+    cells = [
+        (
+            row.name,
+            f"{row.value:.4f}",
+            f"{tolerance[row.name]:.4f}",
+            f"{row.derivative:+.5f}",
+            f"{100 * variance[row.name] / total:.1f} %" if total > 0.0 else None,
         )
-    )
-    yield f"{n} clamps within these tolerances (chosen, {result.spec.distribution}), seed {result.spec.seed}:"
+        for row in rows
+    ]
+    lines = [
+        f"clamp {spec.clamp.name}: splint distance {nominal}",
+        text_table(("dimension", "mm", "+-mm", "mm per mm", "variance"), cells) if rows else note,
+        f"{n} clamps within these tolerances (chosen, {spec.distribution}), seed {spec.seed}:",
+    ]
     if m:
-        spread = f"mean {result.clamped.mean():.4f} mm, standard deviation {result.clamped.std():.4f} mm"
-        yield spread + (f" (linear: {math.sqrt(total):.4f} mm)" if rows else "")
+        linear = f" (linear: {math.sqrt(total):.4f} mm)" if rows else ""
+        spread = f"mean {result.clamped.mean():.4f} mm, standard deviation {result.clamped.std():.4f} mm{linear}"
         values = zip(PERCENTILES, result.percentiles(PERCENTILES), strict=True)
-        yield text_table(("percentile", "mm"), [(f"{p:.1f} %", f"{v:.4f}") for p, v in values], indent=2)
-    yield f"not clamped: {n - m - unproven} of {n} ({100 * (n - m - unproven) / n:.2f} %)"
+        lines += [spread, text_table(("percentile", "mm"), [(f"{p:.1f} %", f"{v:.4f}") for p, v in values], indent=2)]
+    lines.append(f"not clamped: {n - m - unproven} of {n} ({100 * (n - m - unproven) / n:.2f} %)")
     if unproven:
-        yield f"not proven: {unproven} of {n}"
-    yield from (f"  {count:6d}  {reason}" for reason, count in result.reasons().items())
+        lines.append(f"not proven: {unproven} of {n}")
+    return "\n".join([*lines, *(f"  {count:6d}  {reason}" for reason, count in result.reasons().items())])
 
 
 def tolerance_to_dict(result: MonteCarlo, rows: tuple[Sensitivity, ...]) -> dict[str, Any]:

@@ -47,24 +47,16 @@ class Camera:
         return points @ self.axes().T
 
 
-@dataclass(frozen=True, eq=False)
 class Raster:
-    """A window of a view in pixels, (rows, columns) from its lower left corner ``low`` (2,) mm.
+    """A window of a view in pixels, (rows, columns) from its lower left corner ``low`` (2,) mm at least to ``high``.
 
     ``depth`` is that of the nearest face towards the viewer, mm, -inf where there is none; ``image`` is RGBA.
     """
 
-    camera: Camera
-    low: Array
-    pixels_per_mm: float
-    depth: Array
-    image: Array
-
-    @classmethod
-    def of(cls, camera: Camera, low: Array, high: Array, pixels_per_mm: float) -> Raster:
-        """An empty one that reaches at least to ``high`` (2,) mm."""
+    def __init__(self, camera: Camera, low: Array, high: Array, pixels_per_mm: float) -> None:
         columns, rows = np.ceil((high - low) * pixels_per_mm).astype(int)
-        return cls(camera, low, pixels_per_mm, np.full((rows, columns), -np.inf), np.zeros((rows, columns, 4)))
+        self.camera, self.low, self.pixels_per_mm = camera, low, pixels_per_mm
+        self.depth, self.image = np.full((rows, columns), -np.inf), np.zeros((rows, columns, 4))
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -155,7 +147,7 @@ def draw_solids(
     ax.set_axis_off()
     layers = [solids] if inside is None else [*([solid] for solid in solids), inside]
     for zorder, layer in enumerate(layers):
-        raster = Raster.of(camera, *window, pixels / float((window[1] - window[0]).max()))
+        raster = Raster(camera, *window, pixels / float((window[1] - window[0]).max()))
         alpha = 1.0 if inside is None or layer is inside else _GHOST
         for solid in layer:
             raster.paint(solid)

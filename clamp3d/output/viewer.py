@@ -28,10 +28,10 @@ from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
-from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
-from clamp3d.output.viewer_scene import Command, Pieces, SceneDrawing
+from clamp3d.output.serving import Command, CommandLog, MeshcatServer, PageServer
+from clamp3d.output.viewer_scene import Pieces, SceneDrawing
 from clamp3d.output.viewer_story import LISTED, ClampStory, Stop, Story, findings_of, findings_of_clamp
-from clamp3d.output.wording import by_group, counted, distance_text, first_text, headline, meaning, severity, titles
+from clamp3d.output.wording import by_group, headline, meanings, severity, titles
 from clamp3d.scenefile.check import opened
 
 _CURVES = 4
@@ -72,13 +72,11 @@ class Viewer(AbstractContextManager["Viewer"]):
     ) -> None:
         self._source = shown if isinstance(shown, ClampStory) else Story(shown)
         self._server, self._log = server, CommandLog()
-        self._mesh_error, self._overlays = mesh_error, list(overlays or {})
+        self._mesh_error, self._overlays = mesh_error, overlays or {}
         self._rows: dict[tuple[str, str], PairResult] = {}
         self._looked = -math.inf
         self._panel = ""
-        self._drawing = SceneDrawing(
-            self._source.scene, self._send, mesh_error=mesh_error, anchors=self._source.anchors, overlays=overlays
-        )
+        self._drawing = SceneDrawing(self._source, self._send, mesh_error, self._overlays)
         self.story: dict[str, Any] = {}
         """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
         self._tell(self._source.waiting, "waiting")
@@ -203,13 +201,14 @@ class Viewer(AbstractContextManager["Viewer"]):
             "curves": {},
             "forces": [force.to_dict() for force in more.get("forces", ())],
             "paths": drawing.paths,
-            "overlays": self._overlays,
+            "overlays": list(self._overlays),
             "uncut": None if source.anchors is None else _UNCUT,
             "facets": self._mesh_error,
             "frame": drawing.framed(),
         }
         numbered = enumerate(self.story["findings"])
         used = {row["verdict"] for stop in stops for row in stop["rows"]}
+        words = meanings(source.scene)
         context = {
             **{"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()},
             "source": source,
@@ -219,13 +218,9 @@ class Viewer(AbstractContextManager["Viewer"]):
             "parts": titles(source.scene),
             "colours": VERDICT_COLOURS,
             "force_colour": FORCE,
-            "meanings": {name: meaning(name, source.scene) for name in VERDICT_COLOURS if name in used},
+            "meanings": {name: words[name] for name in VERDICT_COLOURS if name in used},
             "groups": [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])],
             "version": __version__,
-            "gap": distance_text,
-            "first_text": first_text,
-            "counted": counted,
-            "degrees": math.degrees,
         }
         self._panel = render("viewer.panel.html", **(self.story | context | more))
         self._send_story()

@@ -17,18 +17,10 @@ from clamp3d.output.palette import INK
 
 _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
-_FRONT = 10
+FRONT = 10
 """Render order of what is drawn over the solids; labels come after it."""
 _SHADES = 32
 """Colours of a label's picture: its two, and what is between them at their edges."""
-
-
-def command(path: str, what: g.Object) -> dict[str, Any]:
-    """What sets an object at a path; one that is to be seen through the solids is drawn after them."""
-    data: dict[str, Any] = what.lower()
-    if not data["materials"][0].get("depthTest", True):
-        data["object"].setdefault("renderOrder", _FRONT)
-    return {"type": "set_object", "path": path, "object": data}
 
 
 class _Packed(g.Geometry):  # type: ignore[misc]
@@ -120,7 +112,7 @@ def label(text: str, colour: str, at: ArrayLike, *, size: float = 1.0) -> g.Obje
             data: dict[str, Any] = super().lower()
             data["geometries"].clear()
             del data["object"]["geometry"]
-            data["object"] |= {"matrix": matrix.T.ravel().tolist(), "renderOrder": _FRONT + 1}
+            data["object"] |= {"matrix": matrix.T.ravel().tolist(), "renderOrder": FRONT + 1}
             return data
 
     class SpriteMaterial(g.GenericMaterial):  # type: ignore[misc]

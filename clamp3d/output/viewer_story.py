@@ -11,8 +11,8 @@ from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
-from meshcat.animation import Animation, AnimationFrameVisualizer
-from meshcat.path import Path
+from meshcat.animation import Animation
+from meshcat.visualizer import Visualizer
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
@@ -37,7 +37,6 @@ from clamp3d.output.wording import (
     circumstances,
     distance_text,
     first_text,
-    group_sentence,
     sentence,
     titles,
 )
@@ -66,26 +65,15 @@ _SCREWED = math.pi / 3.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """How a pair stands at a moment; ``contact`` is the scene's threshold, mm: an allowed contact may be open."""
+    """How a pair stands at a moment: whether it ``touches``, or overlaps, and what that is in words."""
 
     a: str
     b: str
     verdict: str
     distance: Distance
-    contact: float
+    touches: bool
     what: str = ""
     declared: bool = False
-
-    @classmethod
-    def of(cls, scene: Scene, a: str, b: str, distance: Distance, what: str = "", *, declared: bool = False) -> Row:
-        """A pair with the verdict that its distance has in a scene."""
-        verdict = scene.thresholds.verdict(distance, scene.allowance(a, b)).value
-        return cls(a, b, verdict, distance, scene.contact, what, declared)
-
-    @property
-    def touches(self) -> bool:
-        """Whether the parts are in contact, or overlap."""
-        return self.what == FIRST or self.distance.upper <= self.contact
 
     @property
     def gap(self) -> str:
@@ -198,7 +186,7 @@ class Timeline:
         """What the marks of a stop are called in the scene."""
         return f"{number + 1} {self.stops[number].label}".replace("/", " ")
 
-    def animation(self, root: str, paths: Mapping[str, str], groups: Iterable[str]) -> Animation:
+    def animation(self, root: Visualizer, paths: Mapping[str, str], groups: Iterable[str]) -> Animation:
         """The animation that plays all stops once.
 
         ``paths`` below ``root`` lead to the parts; the marks of a stop are below each of ``groups`` and show while the
@@ -209,9 +197,8 @@ class Timeline:
         moving = [name for name, T in first.poses.items() if any(s.poses[name] is not T for s in self.stops)]
 
         def set_poses(seconds: float, poses: Poses) -> None:
-            frame = AnimationFrameVisualizer(animation, Path((root,)), seconds)
             for name in moving:
-                frame[paths[name]].set_transform(poses[name])
+                animation.at_frame(root[paths[name]], seconds).set_transform(poses[name])
 
         for before, stop in zip([first, *self.stops], self.stops, strict=False):
             for f in np.arange(1, stop.keys) / stop.keys:
@@ -220,9 +207,9 @@ class Timeline:
             set_poses(stop.leave, stop.poses)
             for k, group in ((k, group) for k in range(len(self.stops)) for group in groups):
                 is_here = self.stops[k] is stop
+                marks = root[f"{group}/{self.group(k)}"]
                 for seconds, shown in ((stop.arrive, is_here), (stop.leave, is_here and stop is last)):
-                    marks = AnimationFrameVisualizer(animation, Path((root,)), seconds)[f"{group}/{self.group(k)}"]
-                    marks.set_property("visible", "bool", shown)
+                    animation.at_frame(marks, seconds).set_property("visible", "bool", shown)
         return animation
 
 
@@ -240,14 +227,19 @@ class Story:
     def measure(self, poses: Poses, pairs: Iterable[Pair]) -> list[Row]:
         """Pairs of the parts at some poses, by the engine that every command uses."""
         distances = measure(self.scene.moved(poses), pairs, model=self._model, cache=self._cache)
-        return [Row.of(self.scene, *pair, distance) for pair, distance in distances.items()]
+        return [self._row(*pair, distance) for pair, distance in distances.items()]
+
+    def _row(self, a: str, b: str, distance: Distance, what: str = "", declared: bool = False) -> Row:
+        """A pair with the verdict that its distance has in the scene; contact that is allowed may be open."""
+        verdict = self.scene.thresholds.verdict(distance, self.scene.allowance(a, b))
+        return Row(a, b, verdict.value, distance, distance.upper <= self.scene.contact, what, declared)
 
     def stops(self, result: CheckResult) -> list[Stop]:
         """All stops of a result."""
-        motions, scene = self.scene.motions, self.scene
-        rows = tuple(Row(row.a, row.b, row.verdict.value, row.distance, scene.contact) for row in result.pairs)
+        motions, contact = self.scene.motions, self.scene.contact
+        rows = tuple(Row(r.a, r.b, r.verdict.value, r.distance, r.distance.upper <= contact) for r in result.pairs)
         marks = [motion.name for motion in motions] + [""]
-        poses: Poses = {part.name: part.T_world for part in scene.parts}
+        poses: Poses = {part.name: part.T_world for part in self.scene.parts}
         stops = [Stop("at rest", "at rest", lambda _: poses, rows, marks[0])]
         for motion, mark in zip(motions, marks[1:], strict=True):
             stops += self._motion(result, motion, stops[-1].poses, mark)
@@ -273,7 +265,7 @@ class Story:
                 mark, watched = "" if k else FIRST, tuple((row.a, row.b) for row in contacts[t])
             here = tuple(self.measure(way(1.0), watched))
             if meets:  # the moment is certain; the distance right there may be certain to the contact threshold only
-                here = tuple(replace(row, verdict="contact", what=FIRST) for row in here)
+                here = tuple(replace(row, verdict="contact", what=FIRST, touches=True) for row in here)
             keys, seconds = max(1, math.ceil(abs(going.angle) * (t - t0) / _TURN)), max(0.3, _MOTION * (t - t0))
             yield Stop(motion.name, label, way, here, mark, pairs, keys, seconds, t, halts=meets and k == 0)
 
@@ -302,7 +294,7 @@ def findings_of(result: CheckResult, timeline: Timeline, *, brief: bool = False)
             low, high = focus([*here, row.distance][0])
             yield {
                 **{"a": row.a, "b": row.b, "motion": row.motion, "verdict": row.verdict.value, "group": group.id},
-                "title": group_sentence(group, names),
+                "title": sentence(group.rows, names, group.a, group.b),
                 "text": sentence([row], names),
                 "detail": circumstances(row) if row is group.worst and not brief else "",
                 "moments": timeline.moments(row.motion),
@@ -356,7 +348,7 @@ class ClampStory(Story):
         """A waypoint with its 21 pairs; the nut is drawn turned by as much as it has been screwed on."""
         poses = waypoint.poses
         rows = [
-            Row.of(self.scene, c.a, c.b, c.distance, "" if c.relation == NONE else c.relation, declared=c.declared != 0)
+            self._row(c.a, c.b, c.distance, "" if c.relation == NONE else c.relation, c.declared != 0)
             for c in measure_contacts(self.clamp, poses, self._model, cache=self._cache)
         ]
         rows.sort(key=lambda row: not row.declared)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import LONG
 from clamp3d.engine.result import BAD, CheckResult, PairResult
-from clamp3d.engine.scene import Part, Scene
+from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
 from clamp3d.output.groups import Group, grouped
 
@@ -78,24 +78,19 @@ def _rounded(value: float, towards: Callable[[float], int], digits: int | None =
     return text.rstrip("0").rstrip(".") if digits else text
 
 
-def part_title(part: Part) -> str:
-    """A part's name with what it is, where the name does not say it.
+def titles(scene: Scene) -> dict[str, str]:
+    """Each part's name with what it is, where the name does not say it.
 
     >>> from clamp3d.geometry import shapes
-    >>> part_title(Scene().add("wire", shapes.cylinder(6.5, 80.0)).parts[0])
-    'wire'
+    >>> titles(Scene().add("wire", shapes.cylinder(6.5, 80.0)))
+    {'wire': 'wire'}
     """
-    title = getattr(part.shape, "title", "")
-    return part.name if not title or title.lower() in part.name.lower() else f"{part.name} {title}"
+    words = {part.name: getattr(part.shape, "title", "") for part in scene.parts}
+    return {name: name if title.lower() in name.lower() else f"{name} {title}" for name, title in words.items()}
 
 
-def titles(scene: Scene) -> dict[str, str]:
-    """`part_title` of every part."""
-    return {part.name: part_title(part) for part in scene.parts}
-
-
-def meaning(verdict: str, scene: Scene) -> str:
-    """What a verdict means in this scene."""
+def meanings(scene: Scene) -> dict[str, str]:
+    """What each verdict means in this scene."""
     contact, clearance = scene.thresholds.contact, scene.thresholds.clearance
     return {
         "duplicate": "the same part twice in one place",
@@ -107,7 +102,7 @@ def meaning(verdict: str, scene: Scene) -> str:
         "clearance": f"gap smaller than {clearance:g} mm",
         "allowed": "contact that is meant to be",
         "clear": f"gap larger than {max(contact, clearance):g} mm",
-    }[verdict]
+    }
 
 
 def counted(number: int, one: str, many: str = "") -> str:
@@ -185,11 +180,6 @@ def sentence(rows: Sequence[PairResult], names: Mapping[str, str], a: str = "", 
     return phrases.get(rows[0].verdict, f"{a} and {b}{often}: {gap}")
 
 
-def group_sentence(group: Group, names: Mapping[str, str]) -> str:
-    """A group of findings in words."""
-    return sentence(group.rows, names, group.a, group.b)
-
-
 def circumstances(row: PairResult) -> str:
     """Where a finding is: when in a motion, and where in space parts overlap; or why there is no verdict."""
     details = []
@@ -214,7 +204,8 @@ def first_text(t: float) -> str:
 def group_text(group: Group, names: Mapping[str, str]) -> str:
     """A group of findings in words, and where it is; of several findings, where the worst one is."""
     worst = f"worst {group.worst.a} and {group.worst.b}" if len(group.rows) > 1 else ""
-    return "; ".join(filter(None, (group_sentence(group, names), worst, circumstances(group.worst))))
+    said = sentence(group.rows, names, group.a, group.b)
+    return "; ".join(filter(None, (said, worst, circumstances(group.worst))))
 
 
 def where_text(where: Overlap) -> str:
