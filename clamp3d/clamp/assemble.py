@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypedDict, Unpack
 
 from clamp3d.baselines.cas import Cas
-from clamp3d.baselines.model import ContactModel, check_model
+from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import choice, function, number, text
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.contact import Contact, measure_contacts
@@ -20,8 +19,7 @@ from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
-from clamp3d.clamp.path import Log, meetings
-from clamp3d.clamp.play import Closing, Meetings, play
+from clamp3d.clamp.play import Closing, Log, Meetings, meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import HELD, B, D, S, Section, W
@@ -38,50 +36,19 @@ RESOLUTION = 1e-3
 """Where bisection stops, mm."""
 
 
-class Options(TypedDict, total=False):
-    """Keywords of `assemble`, all of them optional."""
-
-    sequence: str | None
-    solver: Solver
-    step: float
-    tilt_step: float
-    others: bool
-    on_waypoint: Callable[[Waypoint], None] | None
-    progress: Callable[[int, float], None] | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Settings:
-    """`Options` with their defaults. Raises InputError for a value that breaks its rule."""
-
-    sequence: str | None = None
-    solver: Solver = "exact"
-    step: float = STEP
-    tilt_step: float = TILT_STEP
-    others: bool = False
-    on_waypoint: Callable[[Waypoint], None] | None = None
-    progress: Callable[[int, float], None] | None = None
-
-    def __post_init__(self) -> None:
-        choice("solver", self.solver, ("exact", "stepped", "bisection"))
-        object.__setattr__(self, "step", number("step", self.step))
-        object.__setattr__(self, "tilt_step", number("tilt step", self.tilt_step))
-        function("on_waypoint", self.on_waypoint)
-        function("progress", self.progress)
-
-    @property
-    def resolution(self) -> float:
-        """Gaps in mm up to which the solver cannot close further."""
-        return {"exact": CONTACT, "stepped": self.step, "bisection": 10.0 * RESOLUTION}[self.solver]
-
-
 def assemble(
     clamp: Clamp | str | Path = "reference",
     model: ContactModel | None = None,
     *,
     line: WireSize | None = None,
     jumper: WireSize | None = None,
-    **options: Unpack[Options],
+    sequence: str | None = None,
+    solver: Solver = "exact",
+    step: float = STEP,
+    tilt_step: float = TILT_STEP,
+    others: bool = False,
+    on_waypoint: Callable[[Waypoint], None] | None = None,
+    progress: Callable[[int, float], None] | None = None,
 ) -> Assembly:
     """Assemble a clamp with its wires and measure where every part ends up.
 
@@ -125,29 +92,34 @@ def assemble(
     >>> assembly.status, round(assembly.distance, 3)
     ('clamped', 31.53)
     """
-    clamp, model, settings = load_clamp(clamp, line=line, jumper=jumper), model or Cas(), _Settings(**options)
-    if settings.sequence is not None:
-        clamp = replace(clamp, sequence=text("sequence", settings.sequence))
-    check_model(model)
-    return _assembled(clamp, model, settings)
-
-
-def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assembly:
-    """Close the clamp, play its sequence, and measure the end."""
+    clamp, model = load_clamp(clamp, line=line, jumper=jumper), model or Cas()
+    choice("solver", solver, ("exact", "stepped", "bisection"))
+    step, tilt_step = number("step", step), number("tilt step", tilt_step)
+    function("on_waypoint", on_waypoint)
+    function("progress", progress)
+    if sequence is not None:
+        clamp = replace(clamp, sequence=text("sequence", sequence))
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
-    log = Log(section, settings.on_waypoint)
-    closing, final = _close(section, settings)
+    resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
+    log = Log(section, on_waypoint)
+    final: FinalState | SteppedState
+    if solver == "exact":
+        final, closing = _close(section)
+    else:
+        solve = solve_stepped if solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
+        final = solve(section, step=step, tilt_step=tilt_step, progress=progress)
+        closing = Closing(open_start(section), final.q, final.q, [], [])
     travel = play(steps, closing, log)
     poses = section.poses(final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)
-    _add_silent_contacts(log, steps, closing, contacts, settings.resolution)
+    _add_silent_contacts(log, steps, closing, contacts, resolution)
     queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
     q, proven = closing.start, final if isinstance(final, FinalState) else None
     return Assembly(
         clamp=clamp,
         model=model,
-        solver=settings.solver,
-        closing_status=closing_status(section, final, settings.resolution),
+        solver=solver,
+        closing_status=closing_status(section, final, resolution),
         distance=section.splint_distance(final.q),
         closing=section.down_splint(final.q).y,
         tilt=float(final.q[S]) / section.lever,
@@ -157,30 +129,25 @@ def _assembled(clamp: Clamp, model: ContactModel, settings: _Settings) -> Assemb
         events=tuple(log.events),
         path=tuple(log.path),
         undeclared=_undeclared(clamp, contacts, log),
-        resolution=settings.resolution,
+        resolution=resolution,
         violation=proven.violation if proven else None,
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
         start=Start(float(q[D]), 0.0, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
         forces=contact_forces(section, proven) if proven else (),
-        others=_others(section, proven) if proven and settings.others else None,
-        with_play=_with_play(section, proven) if proven and settings.others else None,
+        others=_others(section, proven) if proven and others else None,
+        with_play=_with_play(section, proven) if proven and others else None,
     )
 
 
-def _close(section: Section, settings: _Settings) -> tuple[Closing, FinalState | SteppedState]:
-    """Close the clamp: the states on the way, and the last one."""
-    start = open_start(section)
-    if settings.solver == "exact":
-        met: Meetings = []
-        final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
-        met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-        by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
-        taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-        return Closing(start, final.held, final.q, by_hand, taken), final
-    solve = solve_stepped if settings.solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
-    stepped = solve(section, step=settings.step, tilt_step=settings.tilt_step, progress=settings.progress)
-    return Closing(start, stepped.q, stepped.q, [], []), stepped
+def _close(section: Section) -> tuple[FinalState, Closing]:
+    """The proven final state and how the closing came there."""
+    met: Meetings = []
+    final = solve_final_state(section, on_contact=lambda pair, q: met.append((pair, q)))
+    met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
+    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
+    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
+    return final, Closing(final.start, final.held, final.q, by_hand, taken)
 
 
 def _add_silent_contacts(

@@ -10,7 +10,7 @@ from clamp3d.baselines import Cas
 from clamp3d.clamp import final_state
 from clamp3d.clamp.equilibria import same
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.path import meetings
+from clamp3d.clamp.play import meetings
 from clamp3d.clamp.result import Waypoint
 from clamp3d.clamp.section import D, Section
 from clamp3d.engine.model import ModelCache
