@@ -113,7 +113,7 @@ def assemble(
     poses = section.poses(final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     _add_silent_contacts(log, steps, closing, contacts, resolution)
-    queries = section.queries.contact  # what the assembly itself asked, without the other equilibria
+    queries = section.queries  # what the assembly itself asked, without the other equilibria
     q, proven = closing.start, final if isinstance(final, FinalState) else None
     return Assembly(
         clamp=clamp,

@@ -109,7 +109,7 @@ class _Gap:
         return cls(*parts, feature, height - radius, foot, normal, centre)
 
 
-class _Frame(NamedTuple):
+class Frame(NamedTuple):
     """Where a part stands, seen from P1: place in mm, cosine and sine of its angle."""
 
     x: float
@@ -132,23 +132,19 @@ class _Frame(NamedTuple):
         return x + self.x, y + self.y
 
 
-_AT_REST = _Frame(0.0, 0.0)
+_AT_REST = Frame(0.0, 0.0)
 
 
-@dataclass
-class Queries:
-    """How often the contact model was asked about a groove and a wire: C of Table 5."""
-
-    contact: int = 0
-
-
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Section:
-    """A clamp whose grooves are measured by ``model``; counts its queries."""
+    """A clamp whose grooves are measured by ``model``.
+
+    ``queries`` counts how often the model was asked about a groove and a wire: C of Table 5.
+    """
 
     clamp: Clamp
     model: ContactModel
-    queries: Queries = field(default_factory=Queries)
+    queries: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         instance("clamp", self.clamp, Clamp)
@@ -196,15 +192,11 @@ class Section:
         twist[1, [1, 2], [U, S]] = -1.0, 1.0 / self.lever
         return twist
 
-    def down_splint(self, q: Array) -> SectionPose:
+    def down_splint(self, q: Array) -> Frame:
         """P2 seen from P1."""
-        down = self._down(q)
-        return SectionPose(down.x, down.y, float(q[S]) / self.lever)
-
-    def _down(self, q: Array) -> _Frame:
         angle = float(q[S]) / self.lever
         x, y = self.bolt_x + float(q[B] + q[V] + q[W]), float(q[D] - q[U])
-        return _Frame(x, y, math.cos(angle), math.sin(angle))
+        return Frame(x, y, math.cos(angle), math.sin(angle))
 
     def poses(self, q: Array, saddle_d: float | None = None) -> dict[PartName, SectionPose]:
         """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
@@ -215,7 +207,7 @@ class Section:
         bolt_x = x + self.bolt_x + float(q[B])
         return {
             "P1": SectionPose(x, y),
-            "P2": SectionPose(x + down.x, y + down.y, down.angle),
+            "P2": SectionPose(x + down.x, y + down.y, float(q[S]) / self.lever),
             "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
             "P4": SectionPose(bolt_x, bolt_y),
             "P5": SectionPose(bolt_x, y - clamp.nut.height),
@@ -257,13 +249,11 @@ class Section:
 
     def escaped(self, q: Array) -> tuple[PartName, ...]:
         """The wires whose centre is beside a splint: nothing leads them back."""
-        half, pose, escaped = self.clamp.down_splint.width / 2, self.down_splint(q), []
-        for i, wire in enumerate(WIRES):
-            x, y = float(q[2 * i]), float(q[2 * i + 1])
-            u = (x - pose.x) * math.cos(pose.angle) - (y - pose.y) * math.sin(pose.angle)
-            if not (0.0 <= x <= self.clamp.up_splint.width and abs(u) <= half):
-                escaped.append(wire)
-        return tuple(escaped)
+        down, places = self.down_splint(q), zip(WIRES, q[:4].reshape(2, 2).tolist(), strict=True)
+        width = self.clamp.up_splint.width
+        return tuple(
+            wire for wire, (x, y) in places if not (0.0 <= x <= width and abs(down.seen(x, y)[0]) <= self.lever)
+        )
 
     def open_state(self, d: float, tilt: float = 0.0) -> Array:
         """State with the down splint at ``d`` and ``tilt``, both wires in the middle between their two arc centres.
@@ -273,14 +263,14 @@ class Section:
         """
         q = np.zeros(SIZE)
         q[D], q[S] = d, self.lever * tilt
-        pose = self.down_splint(q)
+        down = self.down_splint(q)
         for i, wire in enumerate(WIRES):
             q[2 * i : 2 * i + 2] = 0.5 * np.add(*self.arc_centres(q, wire))
             for low, high in (self.mouth(wire), self.reach(wire)):
                 q[2 * i] = min(max(q[2 * i], low), high)
             r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
-            under = pose.point((q[2 * i] - pose.x) / math.cos(pose.angle), face)[1]
-            low, high = self.clamp.up_splint.thickness + r, under - r / math.cos(pose.angle)
+            under = down.point((q[2 * i] - down.x) / down.cos, face)[1]
+            low, high = self.clamp.up_splint.thickness + r, under - r / down.cos
             if low <= high:
                 q[2 * i + 1] = min(max(q[2 * i + 1], low), high)
         return q
@@ -294,23 +284,23 @@ class Section:
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, inner faces, stops, and the round back in the saddle."""
-        down = self._down(q)
+        down = self.down_splint(q)
         stops = [*self._faces(down), *self._stops(q, down), *self._groove("P3", "P2", q, down)]
         return self._collect(q, [*self._wire("P6", q, down), *self._wire("P7", q, down), *stops])
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._collect(q, self._wire(wire, q, self._down(q)))
+        return self._collect(q, self._wire(wire, q, self.down_splint(q)))
 
     def face_gap(self, q: Array) -> float:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
-        return min(row.value for row in self._faces(self._down(q)))
+        return min(row.value for row in self._faces(self.down_splint(q)))
 
     def seated(self, q: Array) -> Array:
         """The state with the saddle drawn up to the round back, as the contact model sees them."""
         q = q.copy()
         for _ in range(_ADVANCES):
-            gap = min(row.value for row in self._groove("P3", "P2", q, self._down(q)))
+            gap = min(row.value for row in self._groove("P3", "P2", q, self.down_splint(q)))
             if abs(gap) <= 1e-12 * self.clamp.saddle.radius:
                 break
             q[[D, U]] -= gap
@@ -319,15 +309,15 @@ class Section:
     def work(self, q: Array, pair: Sequence[Pair], point: Array, push: Array) -> Array:
         """Work (k, 12) of ``push`` (k, 2) on the second part of each pair at ``point`` (k, 2), and of its reaction on
         the first, for unit changes of q and of the turns of both wires over their radius."""
-        origin, down = np.zeros((len(PARTS), 2)), self._down(q)
-        origin[1], origin[5], origin[6] = (down.x, down.y), q[:2], q[2:4]
-        total = 0.0
-        for side, sign in ((0, -1.0), (1, 1.0)):
-            part = [_INDEX[names[side]] for names in pair]
-            arm = point - origin[part]
-            moment = push[:, 0] * arm[:, 1] - push[:, 1] * arm[:, 0]
-            total = total + sign * np.einsum("kj,kjn->kn", np.column_stack([push, moment]), self._twists[part])
-        return np.asarray(total)
+        first, second = (self._velocities(q, [names[side] for names in pair], point) for side in (0, 1))
+        return np.asarray(np.einsum("kj,kjn->kn", push, second - first))
+
+    def _velocities(self, q: Array, parts: Sequence[PartName], points: Array) -> Array:
+        """How points (k, 2) of ``parts`` move (k, 2, 12), for unit changes as of `work`."""
+        origin = {"P2": self.down_splint(q)[:2], "P6": q[:2], "P7": q[2:4]}
+        arm = points - np.array([origin.get(part, (0.0, 0.0)) for part in parts])
+        twist = self._twists[[_INDEX[part] for part in parts]]
+        return np.asarray(twist[:, :2] + (arm[:, ::-1] * (1.0, -1.0))[:, :, None] * twist[:, 2:])
 
     def hessian(self, q: Array, gaps: Gaps, force: Array) -> Array:
         """Second derivatives (10, 10) of ``force`` (k,) times the gaps by q.
@@ -335,24 +325,18 @@ class Section:
         A round that moves along a surface changes the gap by its curvature, and where the down splint turns, the arm
         from its origin turns with it, or the surface's normal.
         """
-        down, total = self._down(q), np.zeros((SIZE, SIZE))
-        twists = self._twists[:, :, :SIZE]
-        turn = twists[1, 2]
-
-        def velocity(part: PartName, at: Array) -> Array:
-            right, below = at - (down.x, down.y) if part == "P2" else (0.0, 0.0)
-            return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn * (part == "P2")))
-
+        origin, total = self.down_splint(q)[:2], np.zeros((SIZE, SIZE))
+        turn = self._twists[1, 2, :SIZE]
         for k in np.flatnonzero(force):
-            is_second = gaps.round[k] == gaps.pair[k][1]
+            is_second, centre = gaps.round[k] == gaps.pair[k][1], gaps.centre[k]
             surface, (x, y) = gaps.pair[k][not is_second], gaps.normal[k] * (1.0 if is_second else -1.0)
-            move, centre = velocity(gaps.round[k], gaps.centre[k]), gaps.centre[k]
-            along = np.array([-y, x]) @ (move - velocity(surface, centre))
+            move, carried = self._velocities(q, (gaps.round[k], surface), centre)[:, :, :SIZE]
+            along = np.array([-y, x]) @ (move - carried)
             own = gaps.curvature[k] * np.outer(along, along)
             if "P2" in gaps.pair[k]:
-                own -= ((x, y) @ (centre - (down.x, down.y))) * np.outer(turn, turn)
+                own -= ((x, y) @ (centre - origin)) * np.outer(turn, turn)
             if surface == "P2":
-                right, below = move - twists[1, :2]
+                right, below = move - self._twists[1, :2, :SIZE]
                 cross = np.outer(turn, x * below - y * right)
                 own -= cross + cross.T
             total += force[k] * own
@@ -374,7 +358,7 @@ class Section:
             curvature=np.array([r.curvature for r in rows]),
         )
 
-    def _wire(self, wire: PartName, q: Array, down: _Frame) -> list[_Gap]:
+    def _wire(self, wire: PartName, q: Array, down: Frame) -> list[_Gap]:
         """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
         i, side = 2 * WIRES.index(wire), -1.0 if wire == "P6" else 1.0
         shank = (self.bolt_x + float(q[B]) + side * 0.5 * self.clamp.bolt.diameter, 0.0)
@@ -382,14 +366,14 @@ class Section:
         bolt = _Gap.flat(("P4", wire), "shank", shank, (side, 0.0), q[i : i + 2].tolist(), radius)
         return [*self._groove("P1", wire, q, down), *self._groove("P2", wire, q, down), bolt]
 
-    def _groove(self, part: PartName, inside: PartName, q: Array, down: _Frame) -> list[_Gap]:
+    def _groove(self, part: PartName, inside: PartName, q: Array, down: Frame) -> list[_Gap]:
         """The contact model's pieces of a groove for the wire or the round back that lies in it."""
         pair, frame = self.pairs[part, inside], down if part == "P2" else _AT_REST
         if inside == "P2":
             centre, c, s = (down.x, down.y), down.cos, -down.sin
-            frame = _Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
+            frame = Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
         else:
-            self.queries.contact += 1
+            self.queries += 1
             i = 2 * WIRES.index(inside)
             centre, c, s = (float(q[i]), float(q[i + 1])), frame.cos, frame.sin
         u, v = frame.seen(*centre)
@@ -436,7 +420,7 @@ class Section:
             (side * beyond / away, looks * above / away),
         )
 
-    def _faces(self, down: _Frame) -> list[_Gap]:
+    def _faces(self, down: Frame) -> list[_Gap]:
         """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
         up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
         for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
@@ -447,7 +431,7 @@ class Section:
                 rows.append(_Gap.flat(("P2", "P1"), feature, corner, down.turned(0.0, -1.0), edge))
         return rows
 
-    def _stops(self, q: Array, down: _Frame) -> list[_Gap]:
+    def _stops(self, q: Array, down: Frame) -> list[_Gap]:
         """What ends the down splint's tilt and slide (Table 2 of the paper): its underside on the saddle's edges, its
         slot on the shank, and the play of hole and washer where there is any."""
         rows, clamp, joints = [], self.clamp, self.clamp.joints
