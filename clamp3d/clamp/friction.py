@@ -30,14 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import bisect, linprog, nnls
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.dimensions import Clamp, Joints
-from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, S, Section
-from clamp3d.clamp.status import closing_status
+from clamp3d.clamp.status import closed
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
@@ -178,9 +176,7 @@ class FrictionBand:
     """
 
     def __init__(self, clamp: Clamp) -> None:
-        self.section = Section(replace(clamp, joints=Joints()), Cas())
-        self.final = solve_final_state(self.section)
-        status = closing_status(self.section, self.final)
+        self.section, self.final, status = closed(replace(clamp, joints=Joints()))
         if not (status.clamped and all(seat.seated for seat in status.seats)):
             raise InputError(f"friction band: needs both wires in the arcs of all four grooves, got {status.text!r}")
 

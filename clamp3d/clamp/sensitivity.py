@@ -12,16 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
-from clamp3d.clamp.final_state import FinalState, solve_final_state
+from clamp3d.clamp.final_state import FinalState
 from clamp3d.clamp.section import SIZE, D, S, Section, U
-from clamp3d.clamp.status import closing_status
+from clamp3d.clamp.status import closed
 from clamp3d.errors import NotClampedError, SolverError
 from clamp3d.geometry.pose import Array
 
@@ -69,10 +69,7 @@ def dimension(clamp: Clamp, name: str) -> float:
     if name in ("line.diameter", "jumper.diameter"):
         wire: Wire = getattr(clamp, name.split(".")[0])
         return 2.0 * wire.radius
-    value: Any = clamp
-    for key in name.split("."):
-        value = getattr(value, key)
-    return float(value)
+    return float(attrgetter(name)(clamp))
 
 
 def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
@@ -120,9 +117,7 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     >>> {s.name: round(s.derivative, 4) for s in sensitivity(load_clamp())}["line.diameter"]
     1.2144
     """
-    section = Section(clamp, Cas())
-    final = solve_final_state(section)
-    status = closing_status(section, final)
+    section, final, status = closed(clamp)
     if not status.clamped:
         raise NotClampedError(f"no sensitivity: {status}")
     derivative = _derivatives(section, final)

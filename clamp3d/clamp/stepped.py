@@ -8,7 +8,7 @@ its tilt multiples of ``tilt_step``, the wires settle freely, and the first posi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,10 +21,8 @@ from clamp3d.geometry.pose import Array
 
 FREE = 1e-9
 """Overlap up to this many mm is rounding, not overlap."""
-
-
 _MOVES = 100_000
-"""The most moves of one kind from one end to the other."""
+"""The most moves of one kind from one end to the other: more would not end within a day."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +32,31 @@ class SteppedState:
     q: Array
     gaps: Gaps
     motion_steps: int
+
+
+@dataclass
+class _Search:
+    """Positions ``tried`` so far; ``progress`` is told of each move, with how many these are and d in mm."""
+
+    section: Section
+    progress: Callable[[int, float], None] | None
+    tried: int = 0
+
+    def lower(self, q: Array, d: float, tilts: Iterable[float], settle: bool) -> Array | None:
+        """The state with the down splint at ``d`` and the first tilt that is free, or None."""
+        for tilt in tilts:
+            self.tried += 1
+            state = _place(self.section, q, d, tilt, settle)
+            if state is not None:
+                if self.progress is not None:
+                    self.progress(self.tried, d)
+                return state
+        return None
+
+    def end(self, q: Array) -> SteppedState:
+        """The last free state, with the saddle drawn up."""
+        q = self.section.seated(q)
+        return SteppedState(q, self.section.gaps(q), self.tried)
 
 
 def solve_stepped(
@@ -59,23 +82,18 @@ def solve_stepped(
     limit = int(section.clamp.tilt_stop / tilt_step + 1e-9)
     tilts = range(-limit, limit + 1)
     first = math.ceil(start / step)
-    q, tilt, tried = section.open_state(first * step), 0, 0
+    q, tilt, search = section.open_state(first * step), 0, _Search(section, progress)
     for k in range(first, -_MOVES, -1):
         nearest = sorted(tilts, key=lambda i: (abs(i - tilt), abs(i)))
-        lower, tries = _first_free(section, q, k * step, [i * tilt_step for i in nearest], settle=False)
-        tried += tries
+        lower = search.lower(q, k * step, (i * tilt_step for i in nearest), settle=False)
         if lower is None:
             break
         q, tilt = lower, round(float(lower[S]) / section.lever / tilt_step)
-        if progress is not None:
-            progress(tried, k * step)
     if k == first:
         raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
     # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
     free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
-    q = max(free, key=lambda p: float(section.gaps(p).value.min()), default=q)
-    q = section.seated(q)
-    return SteppedState(q, section.gaps(q), tried)
+    return search.end(max(free, key=lambda p: float(section.gaps(p).value.min()), default=q))
 
 
 def solve_bisection(
@@ -92,8 +110,7 @@ def solve_bisection(
     one there is. How much more is not bounded. Raises as `solve_stepped`.
     """
     state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
-    q, tried = state.q, state.motion_steps
-    limit = section.clamp.tilt_stop
+    q, search, limit = state.q, _Search(section, progress, state.motion_steps), section.clamp.tilt_stop
     while step > resolution:
         step, tilt_step = 0.5 * step, 0.5 * tilt_step
         # A move down may need a turn of many tilt steps: those of twice the size are next.
@@ -103,21 +120,8 @@ def solve_bisection(
             q, tilt = lower, float(lower[S]) / section.lever
             tilts = dict.fromkeys(tilt + side * turn for turn in turns for side in (1.0, -1.0))
             allowed = [candidate for candidate in tilts if abs(candidate) <= limit]
-            lower, tries = _first_free(section, q, float(q[D]) - step, allowed, settle=True)
-            tried += tries
-            if lower is not None and progress is not None:
-                progress(tried, float(lower[D]))
-    q = section.seated(q)
-    return SteppedState(q, section.gaps(q), tried)
-
-
-def _first_free(section: Section, q: Array, d: float, tilts: Sequence[float], settle: bool) -> tuple[Array | None, int]:
-    """The state with the down splint at ``d`` and the first tilt that is free, or None; and how many were tried."""
-    for tried, tilt in enumerate(tilts, 1):
-        state = _place(section, q, d, tilt, settle)
-        if state is not None:
-            return state, tried
-    return None, len(tilts)
+            lower = search.lower(q, float(q[D]) - step, allowed, settle=True)
+    return search.end(q)
 
 
 def _place(section: Section, q: Array, d: float, tilt: float, settle: bool) -> Array | None:

@@ -21,13 +21,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clamp3d.baselines.cas import Cas
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
-from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import closing_status
+from clamp3d.clamp.status import closed
 from clamp3d.errors import InputError, SolverError, need, without_numbers
 from clamp3d.files.child import end_with_parent
 from clamp3d.geometry.pose import Array
@@ -180,21 +177,15 @@ def monte_carlo(
     choice("distribution", distribution, ("uniform", "normal"))
     spec = Spec(clamp, seed, distribution, _tolerances(clamp, tolerance, wire_tolerance_percent))
     nominal, nominal_status = _closed(clamp)
-    samples = _samples(spec, n, processes, scheduler, progress or (lambda done, of: None))
-    distance = np.array([math.nan if d is None else d for d, _ in samples])
-    return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
-
-
-def _samples(
-    spec: Spec, n: int, processes: int, scheduler: str | None, progress: Callable[[int, int], None]
-) -> list[Sample]:
-    """Samples 0 to ``n``, in order."""
+    progress = progress or (lambda done, of: None)
     progress(0, n)
     chunks: dict[int, list[Sample]] = {}
     for k, chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
         chunks[k] = chunk
         progress(sum(map(len, chunks.values())), n)
-    return [sample for k in sorted(chunks) for sample in chunks[k]]
+    samples = [sample for k in sorted(chunks) for sample in chunks[k]]
+    distance = np.array([math.nan if d is None else d for d, _ in samples])
+    return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
 
 
 def sample_dimensions(spec: Spec, index: int) -> dict[str, float]:
@@ -236,9 +227,7 @@ def _sample(spec: Spec, index: int) -> Sample:
 
 
 def _closed(clamp: Clamp) -> Sample:
-    section = Section(clamp, Cas())
-    final = solve_final_state(section)
-    status = closing_status(section, final)
+    section, final, status = closed(clamp)
     return (section.splint_distance(final.q) if status.clamped else None), status.text
 
 

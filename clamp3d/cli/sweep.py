@@ -8,8 +8,7 @@ from typing import Literal
 
 import click
 
-from clamp3d.clamp.capture import Outcome
-from clamp3d.clamp.placement import placement
+from clamp3d.clamp.placement import Outcome, placement
 from clamp3d.cli.options import JSON, PICTURE, ClampSource, Quiet, command, option
 from clamp3d.cli.terminal import bar, finish, save, show
 from clamp3d.output.figures import save_figure

@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 
 from clamp3d import InputError, assemble, load_clamp, placement
 from clamp3d.baselines import Cas
-from clamp3d.clamp.capture import CaptureMap, Outcome, close_from
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.placement import close_on
+from clamp3d.clamp.placement import CaptureMap, Outcome, close_from, close_on
 from clamp3d.clamp.section import WIRES, Section
 from clamp3d.errors import NotClampedError
 from clamp3d.kernel import rotation
