@@ -60,10 +60,10 @@ class Wedges(PolytopeModel):
 
     def cut(self, name: str, part: Solid) -> Polytopes:
         """See `PolytopeModel`. Raises InputError as `part_wedges` does."""
-        wedges = wedge_solids(part, self.unit_angle)
-        return Polytopes(
-            [convex(corners, f"{name} {wedge}") for wedge, corners in wedges], [wedge for wedge, _ in wedges]
-        )
+        wedges, body = part_wedges(part, self.unit_angle), part.bodies[0]
+        corners = [prism(wedge.polygon, body.start, body.end) @ body.frame.T for wedge in wedges]
+        shapes = [convex(points, f"{name} {wedge.name}") for wedge, points in zip(wedges, corners, strict=True)]
+        return Polytopes(shapes, [wedge.name for wedge in wedges])
 
 
 def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
@@ -98,12 +98,6 @@ def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
 def prism(polygon: Array, start: float, end: float) -> Array:
     """Corners (2k, 3) of a polygon (k, 2) drawn from z = start to end."""
     return np.vstack([np.column_stack([polygon, np.full(len(polygon), z)]) for z in (start, end)])
-
-
-def wedge_solids(part: Solid, unit_angle: float) -> list[tuple[str, Array]]:
-    """Name of each wedge of a part and its corners (n, 3) in the part's frame; wedges of two cells may share a name."""
-    body = part.bodies[0]
-    return [(w.name, prism(w.polygon, body.start, body.end) @ body.frame.T) for w in part_wedges(part, unit_angle)]
 
 
 def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:

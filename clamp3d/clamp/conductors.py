@@ -34,11 +34,6 @@ def catalogue() -> dict[str, Conductor]:
     }
 
 
-@lru_cache(maxsize=1)
-def _folded() -> dict[str, Conductor]:
-    return {name.casefold(): entry for name, entry in catalogue().items()}
-
-
 def conductor(designation: str) -> Conductor:
     """The conductor of that designation, upper and lower case alike. Raises InputError naming the nearest ones.
 
@@ -46,7 +41,8 @@ def conductor(designation: str) -> Conductor:
     Traceback (most recent call last):
     clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-210, LJ-120, LJ-25 (all 51: clamp3d conductors)
     """
-    entry = _folded().get(designation.strip().casefold())
+    wanted = designation.strip().casefold()
+    entry = next((entry for name, entry in catalogue().items() if name.casefold() == wanted), None)
     if entry is None:
         import difflib
 

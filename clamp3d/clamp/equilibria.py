@@ -1,16 +1,28 @@
-"""All equilibria of a clamp: the local minima of the distance between the splints."""
+"""All equilibria of a clamp: the local minima of the distance between the splints.
+
+Closing begins just above each local minimum of the feasible distance, sampled over tilts and positions of the wires.
+For each groove the curve on which the wire's centre runs when it touches is found point by point, moving the wire by
+its distance until that is small (conservative advancement: no step can pass through). The two curves of a wire,
+turned against each other, tell how close the splints can come with the wire at a position. The feasible distance is the
+maximum over both wires and the faces; its grid-local minima are the initial guesses.
+"""
 
 from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import TITLES, PartName
-from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.landscape import initial_guesses
-from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, Section
+from clamp3d.clamp.final_state import FinalState, open_up, solve_final_state
+from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, S, Section, U
 from clamp3d.clamp.status import stop_words
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
+from clamp3d.kernel.contact_model import GroovePair
 
 OFF_ARC = ("face ", "flat", "lip", "end", "corner", EDGE)
 """How the names of features begin that are not of a groove's arc."""
@@ -18,14 +30,22 @@ SAME = 1e-6
 """States whose distance, tilt and held wires agree to this many mm are one."""
 _STRIDE = 0.004
 """Longest step of a path that begins just above an equilibrium, in parts of the down splint's half width."""
+_TILTS, _POSITIONS = 481, 961
+"""Samples of the distance: a hundredth of a wire's radius apart, finer than any lip that holds a wire."""
+_ADVANCES = 80
+"""Each takes a wire to its groove by the distance that is left: a grazing one by half of it."""
+_LEVEL = 1e-9
+"""Distances that differ by this part of the wire's radius are level: between two faces a wire rests anywhere."""
+_CLEAR = 1e-3
+"""Moves in parts of the wire's radius by which a start is opened."""
 
 
 def equilibria(section: Section) -> tuple[FinalState, ...]:
     """All final states of a clamp that are found, each with its proof; the one closed furthest first.
 
-    Starts are taken just above every local minimum of the sampled distance (`landscape`). A clamp in which a wire can
-    rest on a lip as well as in its groove has more than one equilibrium; which one it ends in depends on how it is put
-    together. A state that a wire has slipped out of is among them: the closing ends there too.
+    Starts are taken just above every local minimum of the sampled distance (`initial_guesses`). A clamp in which a
+    wire can rest on a lip as well as in its groove has more than one equilibrium; which one it ends in depends on how
+    it is put together. A state that a wire has slipped out of is among them: the closing ends there too.
     A minimum so shallow that opening by 1.5e-4 of the down splint's half width (0.01 mm of the reference clamp) lets
     the clamp slide on may be missing.
 
@@ -95,3 +115,106 @@ def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
     return ", ".join([*words, *stop_words(state.active)])
+
+
+def initial_guesses(section: Section) -> list[Array]:
+    """Open states q (10,), each just above a local minimum of the feasible distance; the lowest first."""
+    limit, lever = section.clamp.tilt_stops["the slot"], section.lever
+    tilts = np.linspace(-limit, limit, _TILTS)
+    lifted = section.clamp.lifted(tilts)
+    faces = [-section.face_gap(lever * tilt * np.eye(SIZE)[S]) for tilt in tilts]  # least d without an overlap
+    line, jumper = (_Landscape.of(section, i, tilts) for i in range(len(WIRES)))
+
+    def height(k: int, a: int, b: int) -> float:
+        return float(max(faces[k], line.least[k][a], jumper.least[k][b]) + lifted[k])
+
+    guesses: list[Array] = []
+    for k, tilt in enumerate(tilts):
+        for a, b in itertools.product(line.minima(k), jumper.minima(k)):
+            here = height(k, a, b)
+            sides = [height(j, line.slide(j, a), jumper.slide(j, b)) for j in (k - 1, k + 1) if 0 <= j < _TILTS]
+            if min(sides) < here or (k and sides[0] == here):  # the first tilt of a level stretch stands for all
+                continue
+            q = np.zeros(SIZE)
+            q[D], q[S], q[U] = here, lever * tilt, lifted[k]
+            q[:2], q[2:4] = line.place(k, a, here - lifted[k]), jumper.place(k, b, here - lifted[k])
+            guesses.append(q)
+    guesses.sort(key=lambda q: float(q[D]))
+    step = _CLEAR * min(section.clamp.line.radius, section.clamp.jumper.radius)
+    return [opened for q in guesses if (opened := open_up(section, q, step)) is not None]
+
+
+@dataclass(frozen=True)
+class _Landscape:
+    """How close a wire lets the splints come: ``least`` (t, n) mm at all tilts and positions ``x`` (n,).
+
+    Its centre is then ``over`` (n,) deep in the up splint's groove, ``under`` (t, n) in the down splint's. A wire at
+    position ``outside`` leaves the clamp.
+    """
+
+    x: Array
+    over: Array
+    under: Array
+    least: list[list[float]]
+    outside: int
+
+    @classmethod
+    def of(cls, section: Section, i: int, tilts: Array) -> _Landscape:
+        wire, bolt = WIRES[i], section.bolt_x
+        up, down = section.pairs["P1", wire], section.pairs["P2", wire]
+        r, (low, high) = up.cylinder.radius, section.reach(wire)
+        face = section.clamp.down_splint.face_depth
+        x = np.linspace(low, high, _POSITIONS)
+        over = _curve(section, up, x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
+        deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
+        aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
+        u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
+        v = _curve(section, down, u, face - 1.01 * r, 1.0)
+        under = np.array([_turned(u, v, tilt, bolt, x) for tilt in tilts])
+        least = np.round((over - under) / (_LEVEL * r)) * (_LEVEL * r)
+        return cls(x, over, under, least.tolist(), 0 if i == 0 else _POSITIONS - 1)
+
+    def minima(self, k: int) -> list[int]:
+        """Positions of the local minima at tilt k, but for where the wire leaves the clamp; the first of level ones."""
+        row = np.array(self.least[k])
+        starts = np.flatnonzero(np.diff(row, prepend=np.inf))
+        level = np.concatenate([[np.inf], row[starts], [np.inf]])
+        is_low = (level[1:-1] < level[:-2]) & (level[1:-1] < level[2:])
+        return [position for position in starts[is_low].tolist() if position != self.outside]
+
+    def slide(self, k: int, position: int) -> int:
+        """Where a wire at a position slides to when the splint has tilt k."""
+        row = self.least[k]
+        while True:
+            beside = min(max(position - 1, 0), min(position + 1, len(row) - 1), key=row.__getitem__)
+            if row[beside] >= row[position]:
+                return position
+            position = beside
+
+    def place(self, k: int, position: int, d: float) -> tuple[float, float]:
+        """The wire's centre with the down splint at d: in the middle of its room."""
+        return self.x[position], 0.5 * (self.over[position] + d + self.under[k, position])
+
+
+def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: float) -> Array:
+    """How deep (n,) a wire's centre gets into a groove at positions u (n,), from depth ``start`` in sense ``sign``."""
+    T = np.tile(np.eye(4), (len(u), 1, 1))
+    T[:, 0, 3], T[:, 2, 3] = u, -start
+    moving = np.arange(len(u))
+    for _ in range(_ADVANCES):
+        way = section.model.distances(pair, T[moving])
+        T[moving, 2, 3] -= sign * np.maximum(way, 0.0)
+        moving = moving[way > 1e-5 * pair.cylinder.radius]
+        if not len(moving):
+            break
+    return -T[:, 2, 3]
+
+
+def _turned(u: Array, v: Array, tilt: float, bolt: float, x: Array) -> Array:
+    """Depth (m,) at places x (m,) of a curve (u, v), n points by rising u, turned by a tilt about ``bolt``.
+
+    Linear between the points; of what the turned curve has over itself the first counts, and its ends beyond them.
+    """
+    c, s = math.cos(tilt), math.sin(tilt)
+    along = np.maximum.accumulate(bolt + u * c + v * s)
+    return np.interp(x, along, v * c - u * s)

@@ -188,7 +188,12 @@ def tighten(
     clamp = assembly.clamp
     preloads = tuple((mu, 1e3 * torque / torque_per_newton(clamp, mu)) for mu in thread)
     preload = Range(preloads[-1][1], preloads[0][1])
-    contacts = tuple(_load(clamp, force, preload) for force in assembly.forces if force.feature != HELD)
+    grooves = {"P1": clamp.up_splint.length, "P2": clamp.down_splint.length}
+    contacts = tuple(
+        ContactLoad(force, preload.times(force.force, force.force), grooves.get(force.a) if force.b in WIRES else None)
+        for force in assembly.forces
+        if force.feature != HELD
+    )
     held = {wire: sum(load.force.force for load in contacts if wire == load.force.b) for wire in WIRES}
     slip = {wire: preload.times(groove[0] * share, groove[-1] * share) for wire, share in held.items()}
     low, high = (1e-3 * torque_per_newton(clamp, mu) for mu in (thread[0], thread[-1]))
@@ -207,11 +212,6 @@ def coefficients(name: str, values: Sequence[float]) -> tuple[float, ...]:
 def _bearing_diameter(clamp: Clamp) -> float:
     """Mean diameter of the nut's face, between hole and flats; mm."""
     return 0.5 * (clamp.nut.across_flats + clamp.up_splint.hole_diameter)
-
-
-def _load(clamp: Clamp, force: Force, preload: Range) -> ContactLoad:
-    length = {"P1": clamp.up_splint.length, "P2": clamp.down_splint.length}.get(force.a)
-    return ContactLoad(force, preload.times(force.force, force.force), length if force.b in WIRES else None)
 
 
 def _limits(
