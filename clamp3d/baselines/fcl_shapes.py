@@ -19,7 +19,7 @@ What python-fcl 0.7.0 does, measured on wedges of a groove of radius 12 against 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import fcl
 import numpy as np
@@ -38,12 +38,10 @@ UNIT = 16384.0
 MIN_SIZE, MAX_SIZE = 0.1, 1e4
 """Extents in mm between which the accuracy stated above was measured; others are refused."""
 
-_EROSIONS = (0.4, 0.9)  # of the radius or half length
+_EROSIONS = (0.4, 0.9)  # of the radius or half length: a thick core for small depths, a thin one for most others
 _SHALLOWEST = 1e-12  # mm: what overlaps by a rim alone is this deep at least
 _RIM = 1e-6  # of the cylinder's size: a witness point this near the rim lies on it
 _WITNESS = 1e-3  # mm apart from which the witness points give a direction at a rim
-
-Kind = Literal["convex", "mesh", "surface"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +58,12 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A solid at the origin of its own frame, ready for FCL; mm. A surface need not be closed."""
+    """A solid at the origin of its own frame, ready for FCL; mm.
 
-    kind: Kind
+    ``is_mesh``: a closed mesh, which is but a surface for FCL; else a convex solid, or a surface that has no inside.
+    """
+
+    is_mesh: bool
     solid: trimesh.Trimesh
     collision_object: Any
 
@@ -71,12 +72,12 @@ def convex(points: ArrayLike, name: str = "convex shape") -> Shape:
     """The convex hull of points (n, 3) as `fcl.Convex`."""
     hull = trimesh.convex.convex_hull(np.asarray(points))
     faces = np.insert(hull.faces, 0, 3, axis=1).ravel()
-    return _shape("convex", hull, fcl.Convex(hull.vertices * UNIT, len(hull.faces), faces), name)
+    return _shape(False, hull, fcl.Convex(hull.vertices * UNIT, len(hull.faces), faces), name)
 
 
 def bvh(mesh: trimesh.Trimesh, name: str = "mesh") -> Shape:
     """A closed triangle mesh (`fcl.BVHModel`)."""
-    return _shape("mesh", mesh, fcl_tree(mesh.vertices * UNIT, mesh.faces), name)
+    return _shape(True, mesh, fcl_tree(mesh.vertices * UNIT, mesh.faces), name)
 
 
 def facets(mesh: Shape) -> list[Shape]:
@@ -85,7 +86,7 @@ def facets(mesh: Shape) -> list[Shape]:
     alone = np.setdiff1d(np.arange(len(mesh.solid.faces)), np.concatenate([*flat, np.empty(0, dtype=np.int64)]))
     parts = mesh.solid.submesh([*flat, *alone[:, None]], repair=False)
     assert isinstance(parts, list)  # as one mesh only with append=True
-    return [Shape("surface", part, _placed(fcl_tree(part.vertices * UNIT, part.faces))) for part in parts]
+    return [Shape(False, part, _placed(fcl_tree(part.vertices * UNIT, part.faces))) for part in parts]
 
 
 class Wire:
@@ -121,7 +122,7 @@ def transform(T: Array) -> Any:
 
 def distance(shape: Shape, wire: Wire) -> float:
     """Signed distance in mm as of `measure`, and faster where the two are apart."""
-    if shape.kind != "mesh":
+    if not shape.is_mesh:
         result = fcl.DistanceResult()
         fcl.distance(shape.collision_object, wire.collision_object, fcl.DistanceRequest(), result)
         if result.min_distance > 0.0:
@@ -150,7 +151,7 @@ def measure(shape: Shape, wire: Wire) -> Measurement:
 
 def contained(shape: Shape, wire: Wire) -> bool:
     """Whether a wire that does not cross a mesh's surface lies inside it (its middle does)."""
-    if shape.kind != "mesh" or wire.cylinder.length > shape.solid.scale:
+    if not shape.is_mesh or wire.cylinder.length > shape.solid.scale:
         return False
     middle = wire.T[:3, 3]
     return bool(winding_numbers(shape.solid.vertices, shape.solid.faces, middle[None])[0] > 0.5)
@@ -181,9 +182,9 @@ def _normal(d: float, on_a: Array, on_b: Array, wire: Wire) -> Array:
     return np.asarray(between / np.linalg.norm(between))
 
 
-def _shape(kind: Kind, solid: trimesh.Trimesh, geometry: Any, name: str) -> Shape:
+def _shape(is_mesh: bool, solid: trimesh.Trimesh, geometry: Any, name: str) -> Shape:
     _check_size(f"{name}: largest extent", float(solid.extents.max()))
-    return Shape(kind, solid, _placed(geometry))
+    return Shape(is_mesh, solid, _placed(geometry))
 
 
 def _placed(geometry: Any) -> Any:

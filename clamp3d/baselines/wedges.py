@@ -25,7 +25,7 @@ _BACK_ERROR = 0.01
 _SLIVER = 1e-6
 """Pieces of less area (mm^2) come from rounding where a ray meets a corner."""
 
-_SAME = 1e-9  # mm
+_SAME = 1e-9  # mm; what differs by less was the same before it was rounded
 
 
 class Wedge(NamedTuple):

@@ -27,17 +27,15 @@ from clamp3d.kernel.contact_model import GroovePair
 OFF_ARC = ("face ", "flat", "lip", "end", "corner", EDGE)
 """How the names of features begin that are not of a groove's arc."""
 SAME = 1e-6
-"""States whose distance, tilt and held wires agree to this many mm are one."""
+"""States whose distance, tilt and held wires agree to this many mm are one: a proof leaves 1e-9."""
 _STRIDE = 0.004
 """Longest step of a path that begins just above an equilibrium, in parts of the down splint's half width."""
-_TILTS, _POSITIONS = 481, 961
-"""Samples of the distance: a hundredth of a wire's radius apart, finer than any lip that holds a wire."""
-_ADVANCES = 80
-"""Each takes a wire to its groove by the distance that is left: a grazing one by half of it."""
+_TILTS, _POSITIONS = 481, 961  # chosen: 0.06 deg and 0.06 mm apart for the reference clamp
+_ADVANCES = 80  # each leaves 1 - cos(slope) of the way to the groove: 1e-6 of it at 80 degrees
 _LEVEL = 1e-9
 """Distances that differ by this part of the wire's radius are level: between two faces a wire rests anywhere."""
 _CLEAR = 1e-3
-"""Moves in parts of the wire's radius by which a start is opened."""
+"""Moves in parts of the wire's radius by which a start is opened: less than the samples are apart."""
 
 
 def equilibria(section: Section) -> tuple[FinalState, ...]:

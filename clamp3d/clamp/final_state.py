@@ -25,14 +25,14 @@ from clamp3d.geometry.pose import Array
 TOLERANCE = 1e-9
 """Largest violated gap and largest optimality residual of a proven answer, in mm."""
 LEVEL = 1e-6
-"""Curvature in 1/mm that counts as none."""
+"""Curvature in 1/mm that counts as none; chosen."""
 
-_ACTIVE = 1e-6
+_ACTIVE = 1e-6  # mm: a start may overlap as much as parts that touch
 _ACTIVE_TRIES = (1e-6, 1e-8, 1e-10, 1e-4)
 """Gaps in the active set, mm: a wire that nearly fills its groove is within the first of contacts it lacks."""
-_ATTEMPTS = 4
+_ATTEMPTS = 4  # chosen: each costs as much as the closing
 _PERTURBATION = 1.5e-3
-"""How far a restart begins from the last end, in parts of the down splint's half width."""
+"""How far a restart begins from the last end, in parts of the down splint's half width: a part of a stride."""
 _ONE_CONTACT = 3e-5
 """Gaps of two parts whose derivatives differ by less are one contact: face and lip where the one goes over into the
 other. A wire of 1 mm that is `TOLERANCE` off the face has turned by so much about the lip."""

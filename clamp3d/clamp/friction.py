@@ -42,13 +42,13 @@ from clamp3d.geometry.pose import Array
 MARGIN = 1e-3
 """How far beyond an end of the band it is proven that nothing balances, mm: the last digit that is printed."""
 CLOSED = 1e-7
-"""Gaps up to this many mm carry force."""
+"""Gaps up to this many mm carry force: the closed form and the section differ by rounding."""
 BALANCED = 1e-6
-"""Largest unbalanced force of a certificate in parts of the bolt force."""
-MOST_FRICTION = 1.0
+"""Largest unbalanced force of a certificate in parts of the bolt force: what gaps of `CLOSED` turn normals by."""
+MOST_FRICTION = 1.0  # chosen: a friction angle of 45 degrees
 _TILTS, _SHARES, _ROUNDS = 300, 11, 7
-"""Samples of the search: tilts to either side, distances a tilt, and how often it is narrowed."""
-_TILTS_BEYOND = 201
+"""Samples of the search: tilts to either side, distances a tilt, and how often it is narrowed (300-fold each)."""
+_TILTS_BEYOND = 201  # chosen: each costs some linear programs
 
 
 @dataclass(frozen=True, slots=True, eq=False)

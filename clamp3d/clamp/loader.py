@@ -16,8 +16,8 @@ from clamp3d.clamp.dimensions import SMALLEST, Clamp, Wire
 from clamp3d.errors import InputError
 from clamp3d.validation import validate
 
-_MOST_BYTES = 2**26
-_MOST_DOTS = 64
+_MOST_BYTES = 2**26  # 64 MiB: a scene of 100 000 parts has a fraction of it
+_MOST_DOTS = 64  # no key of a clamp or a scene has as many
 _DOTTED = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{_MOST_DOTS + 1}}}""")
 
 WireSize: TypeAlias = str | float

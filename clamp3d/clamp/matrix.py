@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, ConnectionType, PartName
 from clamp3d.geometry.pose import Array
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.contact import Contact
 
 TYPES: dict[ConnectionType, str] = {
     0: "no connection",
@@ -94,12 +90,3 @@ class Difference:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return plain(self, gap="gap_mm", place="point") | {"text": str(self)}
-
-
-def differences(contacts: Iterable[Contact], tolerance: float) -> tuple[Difference, ...]:
-    """Where measured contacts differ from the matrix, in both directions; gaps up to ``tolerance`` mm may touch."""
-    return tuple(
-        Difference(c.a, c.b, c.declared, c.type, c.gap, c.point)
-        for c in contacts
-        if c.type != c.declared and not (c.type == 0 and c.gap <= tolerance)
-    )

@@ -42,8 +42,8 @@ TURNS: tuple[Turn, ...] = ("yaw", "pitch")
 
 FLAT = 4
 """Columns of the map for each of its rows: a splint is that much wider than its opening is high."""
-_TOUCH = 1e-7
-_ITERATIONS = 400
+_TOUCH = 1e-7  # mm: far below any seat tolerance
+_ITERATIONS = 400  # chosen: a splint that grazes a wire takes many steps
 _ROUNDS, _STEPS = 5, 64
 """A limit is narrowed 64-fold in each round, to 1e-9 of its range."""
 _IN_GROOVE = (Feature.ARC, Feature.END_ARC)

@@ -12,7 +12,7 @@ from clamp3d.checks import instance
 from clamp3d.clamp.contact import Contact, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
-from clamp3d.clamp.matrix import Difference, Pair, differences, plain
+from clamp3d.clamp.matrix import Difference, Pair, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.engine.scene import Scene
@@ -269,8 +269,12 @@ class Assembly:
 
     @property
     def matrix_differences(self) -> tuple[Difference, ...]:
-        """Where `matrix` differs from the declared one, in both directions."""
-        return differences(self.contacts, self.resolution)
+        """Where `matrix` differs from the declared one, in both directions; gaps up to `resolution` may touch."""
+        return tuple(
+            Difference(c.a, c.b, c.declared, c.type, c.gap, c.point)
+            for c in self.contacts
+            if c.type != c.declared and not (c.type == 0 and c.gap <= self.resolution)
+        )
 
     @property
     def findings(self) -> tuple[Finding, ...]:

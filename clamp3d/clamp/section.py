@@ -46,9 +46,9 @@ EDGES = "saddle's edge"
 
 _SPARE, _SPARE_OF_LEVER = 10.0, 0.2
 """How much wider than the wires need a clamp stands open, mm, and at most how much of its half width."""
-_ADVANCES = 100
+_ADVANCES = 100  # chosen: one is enough but where the round back stands beside the saddle's middle
 _FAR = 1e3
-"""Gap in mm of a piece that another one stands for."""
+"""Gap in mm of a piece that another one stands for: it is never near."""
 _FULL = 1e-9
 """Clearance in parts of the groove's radius below which a wire fills it: there is no round to roll in."""
 Point = Sequence[float]
@@ -69,12 +69,8 @@ class Gaps:
         The two parts, and the piece that is nearest.
     point, normal : ndarray (k, 2)
         On one of the parts, and from the first part to the second; P1's section frame (right, down).
-    round : tuple of str
-        Which of the two parts is the round or has the corner.
-    centre : ndarray (k, 2)
-        Of the round, or the corner.
-    curvature : ndarray (k,)
-        Second derivative of the gap by motion of the round along the surface, 1/mm.
+    rows : list of Gap
+        The same one by one, with what `Section.hessian` needs.
     """
 
     value: Array
@@ -83,14 +79,16 @@ class Gaps:
     feature: tuple[str, ...]
     point: Array
     normal: Array
-    round: tuple[PartName, ...]
-    centre: Array
-    curvature: Array
+    rows: list[Gap]
 
 
 @dataclass(slots=True)
-class _Gap:
-    """One of `Gaps`; ``normal`` leads from ``surface`` to ``round``."""
+class Gap:
+    """The gap from the ``surface`` of a part to another one's ``round``, or corner.
+
+    ``normal`` leads from surface to round, which is about ``centre``, and ``curvature`` (1/mm) is the gap's second
+    derivative by motion of the round along the surface.
+    """
 
     surface: PartName
     round: PartName
@@ -102,14 +100,14 @@ class _Gap:
     curvature: float = 0.0
 
     @classmethod
-    def flat(cls, parts: Pair, feature: str, origin: Point, normal: Point, centre: Point, radius: float = 0.0) -> _Gap:
+    def flat(cls, parts: Pair, feature: str, origin: Point, normal: Point, centre: Point, radius: float = 0.0) -> Gap:
         """The gap of a straight surface through ``origin`` to a corner, or to a round of ``radius`` mm."""
         height = (centre[0] - origin[0]) * normal[0] + (centre[1] - origin[1]) * normal[1]
         foot = (centre[0] - height * normal[0], centre[1] - height * normal[1])
         return cls(*parts, feature, height - radius, foot, normal, centre)
 
 
-class Frame(NamedTuple):
+class _Frame(NamedTuple):
     """Where a part stands, seen from P1: place in mm, cosine and sine of its angle."""
 
     x: float
@@ -132,7 +130,7 @@ class Frame(NamedTuple):
         return x + self.x, y + self.y
 
 
-_AT_REST = Frame(0.0, 0.0)
+_AT_REST = _Frame(0.0, 0.0)
 
 
 @dataclass(eq=False)
@@ -192,11 +190,15 @@ class Section:
         twist[1, [1, 2], [U, S]] = -1.0, 1.0 / self.lever
         return twist
 
-    def down_splint(self, q: Array) -> Frame:
+    def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
+        down = self._down(q)
+        return SectionPose(down.x, down.y, float(q[S]) / self.lever)
+
+    def _down(self, q: Array) -> _Frame:
         angle = float(q[S]) / self.lever
         x, y = self.bolt_x + float(q[B] + q[V] + q[W]), float(q[D] - q[U])
-        return Frame(x, y, math.cos(angle), math.sin(angle))
+        return _Frame(x, y, math.cos(angle), math.sin(angle))
 
     def poses(self, q: Array, saddle_d: float | None = None) -> dict[PartName, SectionPose]:
         """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
@@ -207,7 +209,7 @@ class Section:
         bolt_x = x + self.bolt_x + float(q[B])
         return {
             "P1": SectionPose(x, y),
-            "P2": SectionPose(x + down.x, y + down.y, float(q[S]) / self.lever),
+            "P2": SectionPose(x + down.x, y + down.y, down.angle),
             "P3": SectionPose(bolt_x + float(q[V]), saddle_y),
             "P4": SectionPose(bolt_x, bolt_y),
             "P5": SectionPose(bolt_x, y - clamp.nut.height),
@@ -249,7 +251,7 @@ class Section:
 
     def escaped(self, q: Array) -> tuple[PartName, ...]:
         """The wires whose centre is beside a splint: nothing leads them back."""
-        down, places = self.down_splint(q), zip(WIRES, q[:4].reshape(2, 2).tolist(), strict=True)
+        down, places = self._down(q), zip(WIRES, q[:4].reshape(2, 2).tolist(), strict=True)
         width = self.clamp.up_splint.width
         return tuple(
             wire for wire, (x, y) in places if not (0.0 <= x <= width and abs(down.seen(x, y)[0]) <= self.lever)
@@ -269,8 +271,8 @@ class Section:
             for low, high in (self.mouth(wire), self.reach(wire)):
                 q[2 * i] = min(max(q[2 * i], low), high)
             r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
-            under = down.point((q[2 * i] - down.x) / down.cos, face)[1]
-            low, high = self.clamp.up_splint.thickness + r, under - r / down.cos
+            under = down.point((q[2 * i] - down.x) / math.cos(down.angle), face)[1]
+            low, high = self.clamp.up_splint.thickness + r, under - r / math.cos(down.angle)
             if low <= high:
                 q[2 * i + 1] = min(max(q[2 * i + 1], low), high)
         return q
@@ -284,23 +286,23 @@ class Section:
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, inner faces, stops, and the round back in the saddle."""
-        down = self.down_splint(q)
+        down = self._down(q)
         stops = [*self._faces(down), *self._stops(q, down), *self._groove("P3", "P2", q, down)]
         return self._collect(q, [*self._wire("P6", q, down), *self._wire("P7", q, down), *stops])
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._collect(q, self._wire(wire, q, self.down_splint(q)))
+        return self._collect(q, self._wire(wire, q, self._down(q)))
 
     def face_gap(self, q: Array) -> float:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
-        return min(row.value for row in self._faces(self.down_splint(q)))
+        return min(row.value for row in self._faces(self._down(q)))
 
     def seated(self, q: Array) -> Array:
         """The state with the saddle drawn up to the round back, as the contact model sees them."""
         q = q.copy()
         for _ in range(_ADVANCES):
-            gap = min(row.value for row in self._groove("P3", "P2", q, self.down_splint(q)))
+            gap = min(row.value for row in self._groove("P3", "P2", q, self._down(q)))
             if abs(gap) <= 1e-12 * self.clamp.saddle.radius:
                 break
             q[[D, U]] -= gap
@@ -309,15 +311,15 @@ class Section:
     def work(self, q: Array, pair: Sequence[Pair], point: Array, push: Array) -> Array:
         """Work (k, 12) of ``push`` (k, 2) on the second part of each pair at ``point`` (k, 2), and of its reaction on
         the first, for unit changes of q and of the turns of both wires over their radius."""
-        first, second = (self._velocities(q, [names[side] for names in pair], point) for side in (0, 1))
-        return np.asarray(np.einsum("kj,kjn->kn", push, second - first))
-
-    def _velocities(self, q: Array, parts: Sequence[PartName], points: Array) -> Array:
-        """How points (k, 2) of ``parts`` move (k, 2, 12), for unit changes as of `work`."""
-        origin = {"P2": self.down_splint(q)[:2], "P6": q[:2], "P7": q[2:4]}
-        arm = points - np.array([origin.get(part, (0.0, 0.0)) for part in parts])
-        twist = self._twists[[_INDEX[part] for part in parts]]
-        return np.asarray(twist[:, :2] + (arm[:, ::-1] * (1.0, -1.0))[:, :, None] * twist[:, 2:])
+        origin, down = np.zeros((len(PARTS), 2)), self._down(q)
+        origin[1], origin[5], origin[6] = (down.x, down.y), q[:2], q[2:4]
+        total = 0.0
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            part = [_INDEX[names[side]] for names in pair]
+            arm = point - origin[part]
+            moment = push[:, 0] * arm[:, 1] - push[:, 1] * arm[:, 0]
+            total = total + sign * np.einsum("kj,kjn->kn", np.column_stack([push, moment]), self._twists[part])
+        return np.asarray(total)
 
     def hessian(self, q: Array, gaps: Gaps, force: Array) -> Array:
         """Second derivatives (10, 10) of ``force`` (k,) times the gaps by q.
@@ -325,24 +327,30 @@ class Section:
         A round that moves along a surface changes the gap by its curvature, and where the down splint turns, the arm
         from its origin turns with it, or the surface's normal.
         """
-        origin, total = self.down_splint(q)[:2], np.zeros((SIZE, SIZE))
-        turn = self._twists[1, 2, :SIZE]
+        origin, total = self._down(q)[:2], np.zeros((SIZE, SIZE))
+        twists = self._twists[:, :, :SIZE]
+        turn = twists[1, 2]
+
+        def velocity(part: PartName, at: Point) -> Array:
+            right, below = np.subtract(at, origin) if part == "P2" else (0.0, 0.0)
+            return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn * (part == "P2")))
+
         for k in np.flatnonzero(force):
-            is_second, centre = gaps.round[k] == gaps.pair[k][1], gaps.centre[k]
-            surface, (x, y) = gaps.pair[k][not is_second], gaps.normal[k] * (1.0 if is_second else -1.0)
-            move, carried = self._velocities(q, (gaps.round[k], surface), centre)[:, :, :SIZE]
-            along = np.array([-y, x]) @ (move - carried)
-            own = gaps.curvature[k] * np.outer(along, along)
-            if "P2" in gaps.pair[k]:
-                own -= ((x, y) @ (centre - origin)) * np.outer(turn, turn)
-            if surface == "P2":
-                right, below = move - self._twists[1, :2, :SIZE]
+            row = gaps.rows[k]
+            x, y = row.normal
+            move = velocity(row.round, row.centre)
+            along = np.array([-y, x]) @ (move - velocity(row.surface, row.centre))
+            own = row.curvature * np.outer(along, along)
+            if "P2" in (row.surface, row.round):
+                own -= ((x, y) @ np.subtract(row.centre, origin)) * np.outer(turn, turn)
+            if row.surface == "P2":
+                right, below = move - twists[1, :2]
                 cross = np.outer(turn, x * below - y * right)
                 own -= cross + cross.T
             total += force[k] * own
         return np.asarray(total)
 
-    def _collect(self, q: Array, rows: list[_Gap]) -> Gaps:
+    def _collect(self, q: Array, rows: list[Gap]) -> Gaps:
         pair = tuple((r.surface, r.round) if r.surface < r.round else (r.round, r.surface) for r in rows)
         point, normal = np.array([r.point for r in rows]), np.array([r.normal for r in rows])
         normal[[r.surface > r.round for r in rows]] *= -1.0
@@ -353,25 +361,23 @@ class Section:
             feature=tuple(r.feature for r in rows),
             point=point,
             normal=normal,
-            round=tuple(r.round for r in rows),
-            centre=np.array([r.centre for r in rows]),
-            curvature=np.array([r.curvature for r in rows]),
+            rows=rows,
         )
 
-    def _wire(self, wire: PartName, q: Array, down: Frame) -> list[_Gap]:
+    def _wire(self, wire: PartName, q: Array, down: _Frame) -> list[Gap]:
         """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
         i, side = 2 * WIRES.index(wire), -1.0 if wire == "P6" else 1.0
         shank = (self.bolt_x + float(q[B]) + side * 0.5 * self.clamp.bolt.diameter, 0.0)
         radius = self.pairs["P1", wire].cylinder.radius
-        bolt = _Gap.flat(("P4", wire), "shank", shank, (side, 0.0), q[i : i + 2].tolist(), radius)
+        bolt = Gap.flat(("P4", wire), "shank", shank, (side, 0.0), q[i : i + 2].tolist(), radius)
         return [*self._groove("P1", wire, q, down), *self._groove("P2", wire, q, down), bolt]
 
-    def _groove(self, part: PartName, inside: PartName, q: Array, down: Frame) -> list[_Gap]:
+    def _groove(self, part: PartName, inside: PartName, q: Array, down: _Frame) -> list[Gap]:
         """The contact model's pieces of a groove for the wire or the round back that lies in it."""
         pair, frame = self.pairs[part, inside], down if part == "P2" else _AT_REST
         if inside == "P2":
             centre, c, s = (down.x, down.y), down.cos, -down.sin
-            frame = Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
+            frame = _Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
         else:
             self.queries += 1
             i = 2 * WIRES.index(inside)
@@ -387,14 +393,14 @@ class Section:
                 bend = -1.0 / max(abs(R - r - gap), _FULL * R)
             elif feature.startswith("lip"):
                 bend = 1.0 / max(r + gap, _FULL * R)
-            rows.append(_Gap(part, inside, feature, gap, (point[0], -point[2]), (normal[0], -normal[2]), centre, bend))
+            rows.append(Gap(part, inside, feature, gap, (point[0], -point[2]), (normal[0], -normal[2]), centre, bend))
         if inside != "P2":
             self._end_face(rows, u, v)
         for row in rows:
             row.point, row.normal = frame.point(*row.point), frame.turned(*row.normal)
         return rows
 
-    def _end_face(self, rows: list[_Gap], u: float, v: float) -> None:
+    def _end_face(self, rows: list[Gap], u: float, v: float) -> None:
         """A splint's faces end at its outer edge: beside it that is the nearest piece to a wire at (u, v).
 
         Pieces that are nearer than the edge stand `_FAR` away: the groove's material has no end.
@@ -420,18 +426,18 @@ class Section:
             (side * beyond / away, looks * above / away),
         )
 
-    def _faces(self, down: Frame) -> list[_Gap]:
+    def _faces(self, down: _Frame) -> list[Gap]:
         """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
         up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
         for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
             corner, edge = down.point(side * self.lever, face), (self.bolt_x + side * 0.5 * up.width, up.thickness)
             if side * (corner[0] - edge[0]) <= 0.0:  # P2's corner under P1's face
-                rows.append(_Gap.flat(("P1", "P2"), feature, edge, (0.0, 1.0), corner))
+                rows.append(Gap.flat(("P1", "P2"), feature, edge, (0.0, 1.0), corner))
             else:  # P1's edge over P2's face
-                rows.append(_Gap.flat(("P2", "P1"), feature, corner, down.turned(0.0, -1.0), edge))
+                rows.append(Gap.flat(("P2", "P1"), feature, corner, down.turned(0.0, -1.0), edge))
         return rows
 
-    def _stops(self, q: Array, down: Frame) -> list[_Gap]:
+    def _stops(self, q: Array, down: _Frame) -> list[Gap]:
         """What ends the down splint's tilt and slide (Table 2 of the paper): its underside on the saddle's edges, its
         slot on the shank, and the play of hole and washer where there is any."""
         rows, clamp, joints = [], self.clamp, self.clamp.joints
@@ -443,14 +449,14 @@ class Section:
         underside = down.point(0.0, splint.underside_depth)
         for side in (-1.0, 1.0):
             edge, shank = (saddle_axis + side * 0.5 * saddle.width, edge_y), axis + side * 0.5 * clamp.bolt.diameter
-            rows.append(_Gap.flat(("P2", "P3"), EDGES, underside, down.turned(0.0, 1.0), edge))
+            rows.append(Gap.flat(("P2", "P3"), EDGES, underside, down.turned(0.0, 1.0), edge))
             for depth in depths:
                 wall = down.point(side * 0.5 * splint.slot_width, depth)
-                rows.append(_Gap.flat(("P4", "P2"), "slot", (shank, 0.0), (side, 0.0), wall))
+                rows.append(Gap.flat(("P4", "P2"), "slot", (shank, 0.0), (side, 0.0), wall))
             if joints.hole:
                 hole = (self.bolt_x + side * 0.5 * up.hole_diameter, 0.0)
-                rows.append(_Gap.flat(("P1", "P4"), "hole", hole, (-side, 0.0), (shank, 0.5 * up.thickness)))
+                rows.append(Gap.flat(("P1", "P4"), "hole", hole, (-side, 0.0), (shank, 0.5 * up.thickness)))
             if joints.washer:
                 hole = (saddle_axis + side * 0.5 * saddle.hole_diameter, 0.0)
-                rows.append(_Gap.flat(("P3", "P4"), "hole", hole, (-side, 0.0), (shank, d + splint.back_radius)))
+                rows.append(Gap.flat(("P3", "P4"), "hole", hole, (-side, 0.0), (shank, d + splint.back_radius)))
         return rows

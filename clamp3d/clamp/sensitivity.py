@@ -44,9 +44,9 @@ DIMENSIONS: tuple[str, ...] = (
 """Dimensions that place splints and wires in the section, and then those that limit play, by their names in clamp
 files; all in mm."""
 
-_WELL_POSED = 1e-10
+_WELL_POSED = 1e-10  # least singular value over the largest: rounding leaves six digits of a derivative
 _NONE = 1e-8
-"""Derivatives below are rounding."""
+"""Derivatives below are rounding of the differences."""
 
 
 @dataclass(frozen=True, slots=True)

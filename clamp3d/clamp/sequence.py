@@ -37,7 +37,7 @@ class Step:
         return self.part + ("|" + "".join(self.followers) if self.followers else "")
 
 
-_MOST = 30
+_MOST = 30  # steps: each that is not published costs seconds of search, and seven parts need about as many
 _SADDLE_AND_BOLT: frozenset[PartName] = frozenset(("P3", "P4"))
 
 

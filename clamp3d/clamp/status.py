@@ -27,7 +27,7 @@ CLAMPED = "clamped"
 _KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))
 """The bolt stands in the middle of these parts' holes, which are wider, but for what play the section counts."""
 _SAME = 1e-12
-"""Gaps in mm that differ by less are of one place."""
+"""Gaps in mm that differ by less are of one place: an arc and its lip differ by rounding where they meet."""
 SeatFeature = Literal["arc", "lip", "flat face", "edge"]
 _DETAILS: dict[SeatFeature, str] = {
     "arc": "seated in the groove",
@@ -113,7 +113,7 @@ def closing_status(section: Section, final: FinalState | SteppedState, resolutio
         return ClosingStatus(False, f"not {CLAMPED}: {reason}", (), places)
     lips = [seat for seat in places if seat.feature == "lip"]
     warnings = tuple(f"{s.wire} rests on a lip of the {TITLES[s.splint]}'s groove, not in its arc" for s in lips)
-    text = f"{CLAMPED}, but {' and '.join(_beside(lips, 'on a lip of', 'groove'))}" if lips else CLAMPED
+    text = f"{CLAMPED}, but {' and '.join(_beside(lips, 'on a lip of'))}" if lips else CLAMPED
     return ClosingStatus(True, text, warnings, places)
 
 
@@ -176,16 +176,16 @@ def _not_held(section: Section, final: FinalState | SteppedState, places: tuple[
     beside = [seat for seat in places if seat.touches and not seat.in_groove]
     alone = [s.wire for s in places if not s.touches]
     held = [f"{s.wire} is held by the {TITLES[s.splint]} alone" for s in places if s.wire in alone and s.in_groove]
-    return " and ".join([*_beside(beside, "beside", "groove", verb="lies "), *held])
+    return " and ".join([*_beside(beside, "lies beside"), *held])
 
 
-def _beside(places: Iterable[Seat], where: str, what: str, verb: str = "") -> list[str]:
-    """'P6 lies beside the up splint's groove' of each wire, or 'beside both splints' grooves'."""
+def _beside(places: Iterable[Seat], where: str) -> list[str]:
+    """'P6 ``where`` the up splint's groove' of each wire, or '... both splints' grooves'."""
     words = []
     for wire, own in itertools.groupby(sorted(places, key=lambda seat: seat.wire), key=lambda seat: seat.wire):
         titles = [TITLES[seat.splint] for seat in own]
-        of = f"the {titles[0]}'s {what}" if len(titles) == 1 else f"both splints' {what}s"
-        words.append(f"{wire} {verb}{where} {of}")
+        groove = f"the {titles[0]}'s groove" if len(titles) == 1 else "both splints' grooves"
+        words.append(f"{wire} {where} {groove}")
     return words
 
 

@@ -46,7 +46,7 @@ _PATIENCE = 15.0
 _SIGMAS = 3.0
 """A tolerance is so many standard deviations of the normal distribution."""
 _TOP = 0.5
-"""Largest tolerance, as part of the nominal size of a wire."""
+"""Largest tolerance, as part of the nominal size of a wire: a draw of the normal distribution stays > 0 to 6 sigma."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,9 +32,9 @@ from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Solid
 
 SPARE = 20.0
-"""Free way in mm between a part that waits and what is in its way."""
+"""Free way in mm between a part that waits and what is in its way; chosen, to be seen in pictures."""
 RESOLUTION = 1e-3
-"""Overlap in mm up to which parts on their way touch."""
+"""Overlap in mm up to which parts on their way touch: they slide along each other, which rounding must not block."""
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "from above": (0.0, 0.0, 1.0),
     "from below": (0.0, 0.0, -1.0),
@@ -45,16 +45,15 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
 }
 """Where a part can come from, as unit vectors of the world: along the bolt, across the wires, along them."""
 _ENDLESS = 20.0
-"""How many times as long as drawn a wire is taken to be."""
+"""How many times as long as drawn a wire is taken to be: no way is as long."""
 _BENDS = (0.5, 0.25, 0.75)
-"""Where a way out bends, in parts of how far the parts can go before they meet something."""
+"""Where a way out bends, in parts of how far the parts can go before they meet something; chosen: half-way first."""
 _SAMPLES = (0.5, 0.25, 0.125, 0.0625, 0.03125)
 """Where a way is checked before all of it is: most ways that are blocked show it there."""
 _SHORTEST = 0.5
-"""Shortest leg of a way with a bend, mm."""
+"""Shortest leg of a way with a bend, mm; chosen."""
 _HERE = np.zeros(3)
-_ROUNDS = 1000
-"""Parts that still wait in each other's way after so many moves apart push each other round in a circle."""
+_ROUNDS = 1000  # parts that are still in each other's way push each other round in a circle
 Offsets = Mapping[PartName, Array]
 """How far parts that wait are from where the section has them, (3,) mm of the world."""
 

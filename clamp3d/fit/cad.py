@@ -17,8 +17,8 @@ from clamp3d.geometry.mesh import Array, IntArray, Mesh
 from clamp3d.geometry.pose import to_source
 
 _SAME = 1e-6
-"""Cylinders (mm, rad) nearer than this are one."""
-_NEAR_END = 0.8
+"""Cylinders (mm, rad) nearer than this are one: ten times what CAD counts as one point, 1e-7 mm."""
+_NEAR_END = 0.8  # part of half an extent beyond which a border edge belongs to that end; chosen
 
 
 def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, dict[str, Any]]], list[str]]:

@@ -16,7 +16,7 @@ from scipy.special import fdtri
 
 from clamp3d.geometry.pose import Array
 
-_DIGITS = 1e-15
+_DIGITS = 1e-15  # rounding alone stops the fit: exact tessellations are fitted exactly
 CONFIDENCE = 0.9973
 """Probability of the covariance part of every error bound: three standard deviations of a normal distribution."""
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum, minimum
 from scipy.special import stdtrit
 
 from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
@@ -53,10 +54,8 @@ class Search:
         angle = angles(self.surface, axis, faces, *perpendicular(axis.direction))
         names, first, cell = np.unique(self.cells[faces], return_index=True, return_inverse=True)
         about = turned(angle, angle[first, :1][cell])
-        largest, least = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-        np.maximum.at(largest, cell, about.max(axis=1))
-        np.minimum.at(least, cell, about.min(axis=1))
-        return np.asarray(largest - least)
+        index = np.arange(len(names))
+        return np.asarray(maximum(about.max(axis=1), cell, index) - minimum(about.min(axis=1), cell, index))
 
 
 def grow(search: Search, axis: Axis, sign: int, seed: IntArray, tolerance: float) -> Region | None:
