@@ -91,8 +91,8 @@ def wire(size: WireSize, name: str = "wire") -> Wire:
 def _read(path: Path) -> tuple[str, str]:
     source = str(path)
     if source in builtin_clamps():
-        return Path(__file__).with_name("data").joinpath(f"{source}.toml").read_text(encoding="utf-8"), source
-    if path.suffix != ".toml" and not os.path.exists(path):
+        path = Path(__file__).with_name("data") / f"{source}.toml"
+    elif path.suffix != ".toml" and not os.path.exists(path):
         built_in = ", ".join(builtin_clamps())
         raise InputError(f"unknown clamp {checks.shown(source)}; built in: {built_in}; or give a .toml file")
     return read_text(path), source

@@ -14,7 +14,7 @@ from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.cylinder import Axis, frame, upward
 from clamp3d.fit.surface import covered
 from clamp3d.geometry.mesh import Array, IntArray, Mesh
-from clamp3d.geometry.pose import to_source
+from clamp3d.geometry.pose import to_source, to_target
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one: ten times what CAD counts as one point, 1e-7 mm."""
@@ -28,7 +28,7 @@ def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, d
     for body in reading.bodies:
         solid = body.shape
         assert isinstance(solid, BrepSolid)
-        placed = solid.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3]
+        placed = to_target(body.T, solid.mesh.vertices)
         others.update(KINDS[kind] for kind in solid.surfaces.kind if kind not in (PLANE, CYLINDER))
         for group in _groups(solid):
             rows = np.flatnonzero(np.isin(solid.face, group))

@@ -17,7 +17,7 @@ from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.geometry import shapes
 from clamp3d.scenefile.parts import prefixed
 from clamp3d.scenefile.pose_table import Pose
-from clamp3d.scenefile.tables import ClampTable, FileTable, SceneTable, clamp_source, part_table
+from clamp3d.scenefile.tables import FileTable, SceneTable, part_table
 from clamp3d.validation import validate
 
 
@@ -60,7 +60,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
 
     try:
         if table.clamp is not None:
-            take(_clamp_scene(table.clamp, folder), "clamp")
+            take(table.clamp.read(folder), "clamp")
         where = "include"
         for file in [table.include] if isinstance(table.include, str) else table.include:
             take(FileTable(file=file).read(folder), file)
@@ -82,11 +82,3 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
         return Scene(tuple(parts), table.contact, table.clearance, tuple(allowed), motions, name, tuple(notes))
     except Clamp3dError as error:
         raise InputError(f"{origin}: {where}{': ' if where else ''}{error}") from None
-
-
-def _clamp_scene(table: ClampTable, folder: Path) -> Scene:
-    from clamp3d.clamp.assemble import assemble
-
-    scene = assemble(clamp_source(table.name, folder), line=table.line, jumper=table.jumper).scene
-    T = table.pose.T()
-    return scene.moved({part.name: T @ part.T_world for part in scene.parts})

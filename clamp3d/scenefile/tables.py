@@ -120,7 +120,7 @@ class ClampPartTable(PartTable, kw_only=True):
         """The shape."""
         from clamp3d.clamp.parts import parts
 
-        return parts(load_clamp(clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
+        return parts(load_clamp(_clamp_source(self.clamp, folder), line=self.line, jumper=self.jumper))[self.part]
 
 
 class FileTable(PartTable, kw_only=True):
@@ -192,6 +192,14 @@ class ClampTable(PartTable, kw_only=True):
     name: str = "reference"
     line: Any = None  # a catalogue name or a diameter, checked where the clamp is loaded
     jumper: Any = None
+
+    def read(self, folder: Path) -> Scene:
+        """Its parts, assembled and moved."""
+        from clamp3d.clamp.assemble import assemble
+
+        scene = assemble(_clamp_source(self.name, folder), line=self.line, jumper=self.jumper).scene
+        T = self.pose.T()
+        return scene.moved({part.name: T @ part.T_world for part in scene.parts})
 
 
 class AllowedTable(Table):
@@ -265,7 +273,7 @@ class SceneTable(Table):
     motions: list[MotionTable] = field(default_factory=list)
 
 
-def clamp_source(name: str, folder: Path) -> str:
+def _clamp_source(name: str, folder: Path) -> str:
     """A built-in clamp's name, or the path of a clamp file beside the scene's."""
     return str(folder / name) if name.endswith(".toml") else name
 
