@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING, STILL, STRIDE, OnContact, descend, open_start
-from clamp3d.clamp.dimensions import PartName
+from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import HELD, SIZE, WIRES, D, Gaps, S, Section, U
+from clamp3d.clamp.status import ClosingStatus, closing_status
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
@@ -142,6 +144,13 @@ def solve_final_state(
         f"final state not proven: largest violated gap {final.violation:.3g} mm, optimality {final.optimality:.3g} mm, "
         f"both must be <= {TOLERANCE:g} mm; curvature {final.curvature:.3g} 1/mm, must be >= 0"
     )
+
+
+def closed(clamp: Clamp) -> tuple[Section, FinalState, ClosingStatus]:
+    """A clamp closed with its exact arcs: its section, the proven final state, and what that has come to."""
+    section = Section(clamp, Cas())
+    final = solve_final_state(section)
+    return section, final, closing_status(section, final)
 
 
 def open_up(section: Section, q: Array, step: float) -> Array | None:

@@ -32,10 +32,10 @@ from scipy.optimize import bisect, linprog, nnls
 
 from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.dimensions import Clamp, Joints
+from clamp3d.clamp.final_state import closed
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, S, Section
-from clamp3d.clamp.status import closed
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 

@@ -19,9 +19,8 @@ import numpy as np
 
 from clamp3d.checks import choice
 from clamp3d.clamp.dimensions import Clamp, Wire
-from clamp3d.clamp.final_state import FinalState
+from clamp3d.clamp.final_state import FinalState, closed
 from clamp3d.clamp.section import SIZE, D, S, Section, U
-from clamp3d.clamp.status import closed
 from clamp3d.errors import NotClampedError, SolverError
 from clamp3d.geometry.pose import Array
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.contact import measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.matrix import PAIRS, Pair
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.section import EDGE, EDGES, SPLINTS, WIRES, D, Gaps, Section
@@ -22,6 +21,9 @@ from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.check import check
 from clamp3d.engine.result import NOT_CLEAN
 from clamp3d.geometry.pose import Array
+
+if TYPE_CHECKING:  # it imports SciPy's optimisers, 0.4 s of CPU, which a scene without a clamp needs not
+    from clamp3d.clamp.final_state import FinalState
 
 CLAMPED = "clamped"
 _KEPT_APART: frozenset[Pair] = frozenset((("P1", "P4"), ("P3", "P4"), ("P4", "P5")))
@@ -92,13 +94,6 @@ class ClosingStatus:
 
     def __str__(self) -> str:
         return self.text
-
-
-def closed(clamp: Clamp) -> tuple[Section, FinalState, ClosingStatus]:
-    """A clamp closed with its exact arcs: its section, the proven final state, and what that has come to."""
-    section = Section(clamp, Cas())
-    final = solve_final_state(section)
-    return section, final, closing_status(section, final)
 
 
 def closing_status(section: Section, final: FinalState | SteppedState, resolution: float = TOUCHING) -> ClosingStatus:

@@ -23,8 +23,8 @@ import numpy as np
 
 from clamp3d.checks import choice, function, instance, number, whole
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.final_state import closed
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
-from clamp3d.clamp.status import closed
 from clamp3d.errors import InputError, SolverError, need, without_numbers
 from clamp3d.files.child import end_with_parent
 from clamp3d.geometry.pose import Array

@@ -123,7 +123,7 @@ def test_what_cannot_be_proven_is_code_4_in_every_command(monkeypatch, main):
     def unproven(*_, **__):
         raise SolverError("final state not proven")
 
-    for module in ("assemble", "status"):
+    for module in ("assemble", "final_state"):
         monkeypatch.setattr(f"clamp3d.clamp.{module}.solve_final_state", unproven)
     for command in ("run", "check reference", "tolerance --n 1", "sweep"):
         ended, said, error = main(*command.split())
