@@ -109,6 +109,20 @@ def assemble(
         solve = solve_stepped if solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
         final = solve(section, step=step, tilt_step=tilt_step, progress=progress)
         closing = Closing(open_start(section), final.q, final.q, [], [])
+    return _assembled(log, steps, closing, final, solver, resolution, others)
+
+
+def _assembled(
+    log: Log,
+    steps: tuple[Step, ...],
+    closing: Closing,
+    final: FinalState | SteppedState,
+    solver: Solver,
+    resolution: float,
+    others: bool,
+) -> Assembly:
+    """Play the sequence of a closing that was solved, and measure its end."""
+    section, clamp, model = log.section, log.section.clamp, log.section.model
     travel = play(steps, closing, log)
     poses = section.poses(final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)

@@ -37,7 +37,7 @@ _AT_REST = 1e-4
 """Speed over the bolt's at which nothing moves: what certifies a final state takes it from there."""
 STILL = 1e-9
 """The same where that is on the ridge of a saddle, from which the motion leaves slowly at first."""
-_STEPS, _ROUNDS = 2000, 12  # many times what a clamp takes, a hundred steps of a few rounds
+_STEPS, _ROUNDS = 2000, 12  # many times the reference clamp's: less than a hundred steps of a few rounds
 _SETTLED, _OVERLAP = 2e-2, 1e-3
 """A step is solved when a round moves it by this part of a stride, and it overlaps by no more than this part."""
 _SHORTEST = 1e-9

@@ -84,10 +84,6 @@ def load(
         line=line,
         jumper=jumper,
     )
-    return _loaded(source, reader)
-
-
-def _loaded(source: str | os.PathLike[str] | Any, reader: Reader) -> Clamp | Scene:
     if isinstance(source, (str, os.PathLike)):
         path = checks.path("source", source)
         if not os.fspath(source):  # else it would be the folder that one is in
