@@ -41,8 +41,8 @@ def conductor(designation: str) -> Conductor:
     Traceback (most recent call last):
     clamp3d.errors.InputError: unknown conductor 'LJ-121'; nearest: LJ-210, LJ-120, LJ-25 (all 51: clamp3d conductors)
     """
-    wanted = designation.strip().casefold()
-    entry = next((entry for name, entry in catalogue().items() if name.casefold() == wanted), None)
+    folded = designation.strip().casefold()
+    entry = next((entry for name, entry in catalogue().items() if name.casefold() == folded), None)
     if entry is None:
         import difflib
 
