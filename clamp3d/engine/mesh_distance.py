@@ -21,7 +21,7 @@ from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
 Enough = Callable[[Distance], bool]
 
-CUTS, FEW_CUTS = 100_000, 2_000
+CUTS, FEW_CUTS = 100_000, 20_000
 """Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much
 less where Open CASCADE can be asked next.
 """

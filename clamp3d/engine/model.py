@@ -21,6 +21,7 @@ from clamp3d.engine.surface import Surface, at_edges
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CYLINDER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
+from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array
@@ -34,18 +35,18 @@ Progress = Callable[[str, int, int], None]
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
-_MOST_FINE = 60_000
+_MOST_FINE = 80_000
 """Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 """Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
-CAD_CHORDS = (0.1, 0.0025)
+CAD_CHORDS = (0.1, 0.0018)
 """Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
 
-Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are
-less than the usual threshold of contact, 0.01 mm.
+Of two equal cylinders, one in the other, facets overlap by a chord error, and at an edge each adds its own twice: five
+fine ones are less than the usual threshold of contact, 0.01 mm.
 """
 
 LAST_CHORDS = (CAD_CHORDS[-1], 0.0006)
@@ -111,6 +112,11 @@ class Model:
     def bodies(self) -> Forms | None:
         """The shape in closed form; None if it has none."""
         raise NotImplementedError
+
+    @property
+    def fine_triangles(self) -> float:
+        """About how many triangles its finest mesh has."""
+        return 0.0
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
         """A mesh of chord error ``chord`` mm; of a bracketed part one that lies ``inside`` of it, or around it."""
@@ -221,9 +227,12 @@ class CadModel(Model):
             return ()
         if not is_closed(coarse.faces):
             return ()
-        # On a face that bends both ways a triangle's error is as its area.
-        fine = float(np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0).sum())
-        return CAD_CHORDS if fine <= _MOST_FINE else CAD_CHORDS[:1]
+        return CAD_CHORDS if _fine_triangles(coarse) <= _MOST_FINE else CAD_CHORDS[:1]
+
+    @cached_property
+    def fine_triangles(self) -> float:
+        """About how many triangles its finest mesh has, or more; infinite if it has none."""
+        return _fine_triangles(self.shape.tessellated(CAD_CHORDS[0])) if len(self.chords) > 1 else np.inf
 
     @cached_property
     def bodies(self) -> Forms | None:
@@ -247,6 +256,11 @@ class CadModel(Model):
     def _surface(self, chord: float, inside: bool) -> Surface:
         mesh = self.shape.tessellated(chord)
         return Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors))
+
+
+def _fine_triangles(coarse: Tessellation) -> float:
+    """Triangles of a fine mesh of a solid at most: on a face that bends both ways their error is as their area."""
+    return float(np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0).sum())
 
 
 class MeshModel(Model):

@@ -22,6 +22,9 @@ _CORNERS = 400
 """Corners of an overlap that are measured."""
 _NO_FURTHER = 1e-3
 """Relative to the greatest distance that was measured: a bound larger by less is sharp."""
+_BEYOND = 1e-6
+_CLEAR = 1e-7
+"""Relative to the size: so far beyond a plane nothing is on it, whatever is rounded."""
 _HAIR = 1e-9
 """Relative to the size: a piece that reaches over a border by less is not cut there."""
 
@@ -102,8 +105,9 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     """Upper bound (mm) of how deep any point of one mesh's surface lies in the other, sharpened until ``is_enough``.
 
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
-    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Infinite where
-    one body may be swallowed whole, since the surfaces then say nothing of its middle.
+    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Another is
+    that of `_moves_out`. Infinite where one body may be swallowed whole, since the surfaces then say nothing of its
+    middle.
     """
     if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
@@ -151,12 +155,30 @@ def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int) -> Ite
 
 
 def _distances(surface: Surface, triangles: Array) -> tuple[Array, Array]:
-    """Distance (m,) of the middles of triangles (m, 3, 3), and of any point of them from the nearest triangle there."""
-    distance, face, _ = surface.nearest(triangles.mean(axis=1))
+    """Distance (m,) of the middles of triangles (m, 3, 3) of the common part from a surface, and of any point at most.
+
+    The least of two bounds: to the triangle nearest to the middle, and the length of a move that takes all of it out.
+    """
+    distance, face, foot = surface.nearest(triangles.mean(axis=1))
     chosen = np.repeat(surface.vertices[surface.faces[face]], 3, axis=0)
     corners = triangles.reshape(-1, 3)
-    largest = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
-    return distance, np.asarray(largest)
+    at_most = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
+    move = _moves_out(surface, triangles, foot, surface.normals[face])
+    length = np.linalg.norm(move, axis=1)
+    rows = np.flatnonzero(length < at_most)
+    rows = rows[surface.is_outside(triangles[rows] + move[rows, None])]
+    at_most[rows] = length[rows]
+    return distance, np.asarray(at_most)
+
+
+def _moves_out(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
+    """Moves (m, 3) that take triangles (m, 3, 3) beyond the planes through ``feet`` (m, 3), along their normals.
+
+    Lemma: who leaves a body crosses its surface, so a point of the body is no further from that than it is moved to be
+    outside.
+    """
+    height = np.einsum("mcj,mj->mc", feet[:, None] - triangles, normals).max(axis=1)
+    return np.asarray((np.maximum(height, 0.0) + _CLEAR * max(1.0, surface.scale))[:, None] * normals)
 
 
 def _cut(surface: Surface, T: Array, pieces: Array) -> Array:

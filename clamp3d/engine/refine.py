@@ -15,7 +15,7 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
-from clamp3d.engine.mesh_distance import FEW_CUTS, meshes_distance
+from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
 from clamp3d.engine.model import LAST_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import Clamp3dError, SolverError
@@ -27,6 +27,9 @@ ACCURACY = 1e-7
 
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
+
+_QUICKLY = 30_000
+"""Triangles of two fine meshes up to which they are made before Open CASCADE is asked, which takes as long then."""
 
 Enough = Callable[[Distance], bool]
 
@@ -40,8 +43,8 @@ def from_boxes(a: Model, b: Model, T: Array) -> Distance:
 def refine(a: Model, b: Model, T: Array, start: Distance, enough: Enough, *, cad_forms: bool = False) -> Distance:
     """Distance of ``b`` at ``T`` (4, 4) in a's frame, from ``start`` (what the boxes said), until ``enough``.
 
-    With ``cad_forms`` the cylinders and holes of two solids from CAD are measured in closed form too, which pays where
-    a pair is asked about often.
+    With ``cad_forms`` the cylinders and holes of two solids from CAD are measured in closed form first, which pays
+    where a pair is asked about often.
     """
     distance = start
     if enough(distance):
@@ -64,52 +67,54 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
         yield "meshes", open_distance(a, b, T)
         return
     if cad_forms or a.exact is None or b.exact is None:
-        if a.quick_bodies is not None and b.quick_bodies is not None:
-            yield "features", _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+        yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
         if _is_round(b) and not a.drawn and a.chords:
             yield "facets", rods_distance(a.outer(a.chords[-1]), b.bodies or (), T)
         if _is_round(a) and not b.drawn and b.chords:
             yield "facets", rods_distance(b.outer(b.chords[-1]), a.bodies or (), inverse(T)).moved(T).swapped()
     if a.exact is not None and b.exact is not None:
-        yield from _levels_of_cad(a, b, T, enough)
+        yield from _levels_of_cad(a, b, T, enough, cad_forms)
         return
     for chord in _chords(a, b):
         yield "meshes", meshes_distance(a, b, T, chord, enough)
 
 
-def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tuple[str, Distance]]:
+def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
     """What meshes and Open CASCADE say of two solids from CAD.
 
-    Open CASCADE mostly takes less time for one pair than fine meshes of both, but not always for a common part.
+    Fine meshes, where they are small, prove that two solids touch in less time than Open CASCADE takes to find nothing
+    that they share.
     """
     from clamp3d.engine.exact import exact_distance, exact_overlap, exact_probe
 
-    chords = _chords(a, b)
-    for chord in chords[:1]:
-        yield "meshes", meshes_distance(a, b, T, chord, enough, cuts=FEW_CUTS)
+    chords = [chord for chord in a.chords if chord in b.chords]
+    quickly = len(chords) if a.fine_triangles + b.fine_triangles <= _QUICKLY else 1
+    for chord in chords[:quickly]:
+        yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
     yield "exact", exact_distance(a, b, T)
     probe = exact_probe(a, b, T)
     yield "exact", probe
     quick = exact_overlap(a, b, T, SHARES[0], quick=True, attested=-probe.upper)
     yield "exact", quick
     attested = -min(probe.upper, quick.upper)
-    for chord in chords[1:]:
+    if not cad_forms:
+        yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+    for chord in chords[quickly:]:
         yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
     for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
         overlap = exact_overlap(a, b, T, share, attested=attested)
         yield "exact", overlap
         if np.isinf(overlap.lower):  # finer ones take longer
             break
-    measured = max(a.chords[-1], b.chords[-1]) if chords else np.inf
     for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
-        if chord < measured:
+        if chord not in chords:
             yield "meshes", _by_fine_meshes(a, b, T, chord, enough, thorough=True)
 
 
 def _by_fine_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:
     """What fine meshes say of two solids from CAD; nothing where they take too long to make."""
     try:
-        return meshes_distance(a, b, T, chord, enough, thorough=thorough)
+        return meshes_distance(a, b, T, chord, enough, thorough=thorough, cuts=CUTS if thorough else FEW_CUTS)
     except Clamp3dError:
         return Distance(level="meshes", method="without fine meshes")
 
@@ -139,7 +144,13 @@ def _agreed(old: Distance, new: Distance) -> Distance:
     return replace(met, lower=min(met.lower, met.upper), upper=max(met.lower, met.upper))
 
 
-def _by_closed_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:
+def _by_closed_forms(a: Forms | None, b: Forms | None, T: Array, enough: Enough) -> Iterator[tuple[str, Distance]]:
+    """What the closed forms of two parts say, if both have one."""
+    if a is not None and b is not None:
+        yield "features", _nearest_forms(a, b, T, enough)
+
+
+def _nearest_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:
     """The nearest pair of the bodies of two parts, asked in the order of their boxes' distances."""
     if len(a) == len(b) == 1:
         return bodies_distance(a[0], b[0], T, enough)

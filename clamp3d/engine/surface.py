@@ -154,6 +154,25 @@ class Surface:
         """Whether each triangle has the part on one side, and what is outside on the other."""
         return self.is_simple and is_closed(self.faces)
 
+    def is_outside(self, triangles: Array) -> NDArray[np.bool_]:
+        """Which of triangles (m, 3, 3) certainly have no point in common with the closed body."""
+        import fcl
+
+        if not len(triangles):
+            return np.empty(0, dtype=bool)
+        corners = np.ascontiguousarray(triangles.reshape(-1, 3))
+        loose = fcl_tree(corners, np.arange(len(corners)).reshape(-1, 3))
+        most = _CONTACTS * len(triangles)
+        result = fcl.CollisionResult()
+        fcl.collide(*fcl_pair(loose, self.bvh, np.eye(4)), fcl.CollisionRequest(num_max_contacts=most), result)
+        if len(result.contacts) >= most:  # some may be missing
+            return np.zeros(len(triangles), dtype=bool)
+        outside = np.ones(len(triangles), dtype=bool)
+        outside[[contact.b1 for contact in result.contacts]] = False
+        behind, is_certain = self._behind_nearest(triangles[outside].mean(axis=1))
+        outside[outside] = is_certain & ~behind
+        return outside
+
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""
         if self.face_error is None:
@@ -172,6 +191,8 @@ class Surface:
         return np.asarray(corner[self.faces].max(axis=1))
 
 
+_CONTACTS = 100
+"""Contacts of each triangle that FCL lists at most, so that its answer does not fill the memory."""
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
 

@@ -101,12 +101,14 @@ def test_errors_of_both_meshes_widen_the_bounds_by_their_sum(gap, e, f):
 
 
 def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound():
-    """Triangles across a bracket and a box: their bounds close in on the furthest point, whatever is cut and how."""
+    """Triangles in a bracket and a box: their bounds close in on the furthest point, whatever is cut and how."""
     rng, one, other = np.random.default_rng(4), Surface(BRACKET.vertices, BRACKET.faces), box_mesh((30.0, 20.0, 10.0))
     weights = rng.dirichlet(np.ones(3), 200)
     for k in range(8):
         T = TURNED if k else np.eye(4)
-        triangles = rng.uniform((0.0, 0.0, 0.0), (40.0, 30.0, 20.0), (4, 3, 3))
+        inside = rng.uniform((0.0, 0.0, 0.0), (5.0, 30.0, 20.0), (2000, 3))  # of one of its walls
+        inside = inside[(np.abs(to_source(T, inside)) <= (15.0, 10.0, 5.0)).all(axis=1)]
+        triangles = inside[:12].reshape(4, 3, 3)
         first, last = None, None
         for pieces in cut_up(one, other, T, triangles, 4000):
             normal = np.cross(
@@ -126,6 +128,30 @@ def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound()
         truth = np.maximum(one.distance(points), other.distance(to_source(T, points))).max()
         assert truth - 1e-9 <= last.at_most.max() <= 1.03 * truth
         assert len(last.triangles) <= 4 + 6000
+
+
+def test_triangles_are_outside_only_where_no_point_of_them_is_inside():
+    rng, one = np.random.default_rng(6), Surface(BRACKET.vertices, BRACKET.faces)
+    triangles = rng.uniform(-8.0, 45.0, (400, 1, 3)) + rng.uniform(-6.0, 6.0, (400, 3, 3))
+    outside = one.is_outside(triangles)
+    points = np.einsum("wc,mcx->mwx", rng.dirichlet(np.ones(3), 300), triangles)
+    touched = one.contains(points.reshape(-1, 3)).reshape(400, 300).any(axis=1)
+    assert not (outside & touched).any()
+    assert outside.sum() > 50  # of those whose middle is nearest to an edge the side is not known
+    on_top = np.array([[[1.0, 1.0, 20.0], [4.0, 1.0, 20.0], [1.0, 9.0, 20.0]]])
+    assert one.is_outside(on_top + [0.0, 0.0, 1e-6]).all()
+    assert not one.is_outside(on_top).any()
+    for unknown in (Surface(one.vertices, one.faces[1:]), Surface(one.vertices, one.faces, is_simple=False)):
+        assert not unknown.is_outside(triangles).any()
+    assert len(one.is_outside(triangles[:0])) == 0
+
+
+def test_where_contacts_may_be_missing_no_triangle_is_outside(monkeypatch):
+    one, across = Surface(BRACKET.vertices, BRACKET.faces), np.array([[[-9.0, 3, 5], [60.0, 3, 5], [20.0, 3, 9]]])
+    apart = across + [0.0, 0.0, 40.0]
+    assert one.is_outside(np.concatenate([across, apart])).tolist() == [False, True]
+    monkeypatch.setattr("clamp3d.engine.surface._CONTACTS", 1)
+    assert one.is_outside(np.concatenate([across, apart])).tolist() == [False, False]
 
 
 @pytest.mark.parametrize("out", [-5.0, -0.1, 0.0, 0.3, 2.0, 9.0])

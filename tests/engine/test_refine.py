@@ -45,7 +45,7 @@ def test_the_nearest_two_of_many_bodies_are_those_of_all_pairs():
         a, b = tuple(some_bodies(rng)), tuple(some_bodies(rng))
         T = rotation(rng.normal(size=3), 1.0)
         T[:3, 3] = rng.normal(size=3) * 8.0
-        found = refine._by_closed_forms(a, b, T, lambda _: False)
+        found = refine._nearest_forms(a, b, T, lambda _: False)
         every = [bodies_distance(x, y, T, lambda _: False) for x in a for y in b]
         lower, upper = min(d.lower for d in every), min(d.upper for d in every)
         if len(every) > 1 and lower < -1e-6:  # of pieces that overlap together the depth is not known
@@ -86,15 +86,24 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
-    last, finest = "0.0025 ['thorough']", "0.0006 ['thorough']"
-    for first, second, fine, end in (((0.1, 0.0025), (0.1, 0.01), ["0.01 []", "0.0025 []"], [last, finest]),
-                                     ((0.1, 0.0025), (0.1, 0.0025), ["0.0025 []"], [finest]),
-                                     ((), (), [], [last, finest])):  # fmt: skip
-        a, b = (SimpleNamespace(exact=1, is_simple=True, chords=chords, refines=True) for chords in (first, second))
+    monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
+    last, finest = "0.0018 ['thorough']", "0.0006 ['thorough']"
+    both = (0.1, 0.0018)
+    for first, second, triangles, quick, fine, end in (
+        (both, (0.1,), math.inf, ["0.1 []"], [], [last, finest]),
+        (both, both, 15_000, ["0.1 []", "0.0018 []"], [], [finest]),
+        (both, both, 15_001, ["0.1 []"], ["0.0018 []"], [finest]),
+        ((), (), math.inf, [], [], [last, finest]),
+    ):
+        a, b = (
+            SimpleNamespace(exact=1, is_simple=True, chords=chords, quick_bodies=(1,), fine_triangles=triangles)
+            for chords in (first, second)
+        )
         order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
-        assert order[: -len(end)] == [*["0.1 []"] * bool(first), "distance", "probe", "0.04 True 5", *fine,
-                                      *["0.04 False 5"] * (not found), "0.015 False 5", "0.004 False 5"]  # fmt: skip
-        assert order[-len(end) :] == end
+        assert order == [*quick, "distance", "probe", "0.04 True 5", "forms", *fine, *["0.04 False 5"] * (not found),
+                         "0.015 False 5", "0.004 False 5", *end]  # fmt: skip
+        a.quick_bodies = None
+        assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
 
 
 def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshes_that_fail_say_nothing(monkeypatch):
@@ -105,7 +114,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
-    a = SimpleNamespace(exact=1, is_simple=True, chords=(), refines=True)
+    a = SimpleNamespace(exact=1, is_simple=True, chords=(), quick_bodies=None, fine_triangles=math.inf)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
     assert len(answers) == 6
