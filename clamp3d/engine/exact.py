@@ -31,10 +31,10 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
     """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least."""
     assert a.exact is not None
     assert b.exact is not None
-    gap, p, q, is_least = cad_process.distance(a.exact.brep, b.exact.brep, T)
-    if gap <= TOLERANCE or not is_least:
-        return Distance(-np.inf, gap + TOLERANCE, p, q, None, None, "exact", METHOD)
-    return Distance(gap - TOLERANCE, gap + TOLERANCE, p, q, (q - p) / np.linalg.norm(q - p), None, "exact", METHOD)
+    gap, p, q, is_least, is_signed = cad_process.distance(a.exact.brep, b.exact.brep, T)
+    lower = gap - TOLERANCE if is_least and (gap > TOLERANCE or is_signed) else -np.inf
+    normal = (q - p) / np.linalg.norm(q - p) if lower > 0.0 else None
+    return Distance(lower, gap + TOLERANCE, p, q, normal, None, "exact", METHOD)
 
 
 def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_each: int = _PROBED) -> Distance:
@@ -47,7 +47,7 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     nothing = Distance(level="exact", method=METHOD)
     if not (a.chords and b.chords):
         return nothing
-    meshes = [model.outer(min(model.chords[0], chord)) for model in (a, b)]
+    meshes = [model.outer(min(model.chords[0], chord), thorough=True) for model in (a, b)]
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
         return nothing

@@ -1,4 +1,4 @@
-"""The surfaces of a solid's faces: planes, cylinders, cones, spheres and tori with their sizes."""
+"""The surfaces of a solid's faces: planes, cylinders, cones, spheres and tori with their sizes, splines among them."""
 
 from __future__ import annotations
 
@@ -23,6 +23,11 @@ _SIZES: dict[str, tuple[str, ...]] = {
     "torus": ("MajorRadius", "MinorRadius"),
 }
 """Open CASCADE's names of `Surfaces.size`."""
+
+_ALIKE = 1e-7
+"""How far (mm) a spline may be from a plane, cylinder, cone or sphere to count as one: Open CASCADE's confusion."""
+_STEP = 1e-4
+"""Step (mm) off a surface to see on which side its normal is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,27 +61,51 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
     """The same of a list of TopoDS_Face."""
     kinds, frames, sizes, senses = [], [], [], []
     for face in faces:
-        surface = occ.BRepAdaptor_Surface(face)
-        name = surface.GetType().name.removeprefix("GeomAbs_").lower()
-        kind, frame, size, is_direct = OTHER, np.vstack([np.zeros(3), np.eye(3)]), [0.0, 0.0], True
-        if name in _SIZES:
-            kind, form = KINDS.index(name), getattr(surface, name.capitalize())()
+        name, form = _canonical(face)
+        kind, frame, size, sense = KINDS.index(name), np.vstack([np.zeros(3), np.eye(3)]), np.zeros(2), 1.0
+        if kind != OTHER:
             place = form.Position()
             axes = (place.XDirection(), place.YDirection(), place.Direction())
             frame = np.array([place.Location().Coord(), *(axis.Coord() for axis in axes)])
-            size = [*(float(getattr(form, of)()) for of in _SIZES[name]), 0.0, 0.0][:2]
-            is_direct = bool(place.Direct())  # its own normal points away from the axis, or along z
-        is_outward = face.Orientation() != occ.TopAbs_Orientation.TopAbs_REVERSED
+            size[: len(_SIZES[name])] = [getattr(form, of)() for of in _SIZES[name]]
+            sense = _sense(face, kind, frame, size)
         kinds.append(kind)
         frames.append(frame)
         sizes.append(size)
-        senses.append(1.0 if is_outward is is_direct else -1.0)
+        senses.append(sense)
     return Surfaces(
         np.array(kinds, dtype=np.int64),
         np.array(frames).reshape(-1, 4, 3),
         np.array(sizes).reshape(-1, 2),
         np.array(senses),
     )
+
+
+def _canonical(face: Any) -> tuple[str, Any]:
+    """Kind of a face and its surface (gp_Pln, gp_Cylinder, ...), also where a file gives it as a spline."""
+    surface = occ.BRepAdaptor_Surface(face)
+    name = surface.GetType().name.removeprefix("GeomAbs_").lower()
+    if name in _SIZES:
+        return name, getattr(surface, name.capitalize())()
+    for kind, form in (("plane", "Pln"), ("cylinder", "Cylinder"), ("cone", "Cone"), ("sphere", "Sphere")):
+        result = getattr(occ, f"gp_{form}")()
+        if getattr(occ.ShapeAnalysis_CanonicalRecognition(face), f"Is{kind.capitalize()}")(_ALIKE, result):
+            return kind, result
+    return "other", None
+
+
+def _sense(face: Any, kind: int, frame: Array, size: Array) -> float:
+    """1.0 where the face's outward normal is that of its surface, else -1.0."""
+    surface = occ.BRepAdaptor_Surface(face)
+    u = 0.5 * (surface.FirstUParameter() + surface.LastUParameter())
+    v = 0.5 * (surface.FirstVParameter() + surface.LastVParameter())
+    point, along_u, along_v = occ.gp_Pnt(), occ.gp_Vec(), occ.gp_Vec()
+    surface.D1(u, v, point, along_u, along_v)
+    step = np.array(along_u.Crossed(along_v).Coord())
+    step *= _STEP / max(float(np.linalg.norm(step)), 1e-300)
+    below, above = height(kind, frame, size, np.array(point.Coord()) + np.array([-step, step]))
+    is_outward = face.Orientation() != occ.TopAbs_Orientation.TopAbs_REVERSED
+    return 1.0 if is_outward is bool(above > below) else -1.0
 
 
 def height(kind: int, frame: Array, size: Array, points: Array) -> Array:

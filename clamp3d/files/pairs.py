@@ -26,6 +26,8 @@ _AT_EDGES = 9.0 / 4.0
 """How many times as far as in a triangle's middle a quadratic surface can be from it, at the middle of an edge."""
 _BEYOND = 0.05
 """How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""
+_ONE_BALL = 1e-7
+"""How far (mm) centres and radii of faces may differ that are one ball's."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
 
@@ -56,12 +58,14 @@ class Nearest(NamedTuple):
     """Distance (mm) of two solids, 0 where they touch or overlap, and nearest points (3,) of the first and the second.
 
     ``is_least`` is False where one of the points is nearer to the other solid: then it is no more than a bound.
+    ``is_signed``: whether the distance of an overlap is minus the greatest depth of a point of one solid in the other.
     """
 
     distance: float
     p: Array
     q: Array
     is_least: bool = True
+    is_signed: bool = False
 
     def swapped(self) -> Nearest:
         """The same of the solids in the other order."""
@@ -91,17 +95,24 @@ def _ball(brep: bytes) -> tuple[Array, float] | None:
     """Centre (3,) and radius of a solid that is a ball; None for others."""
     form, solid = surfaces(brep), from_bytes(brep)
     centre, radius = form.frame[0, 0], float(form.size[0, 0])
-    if not (form.kind == SPHERE).all() or np.ptp(form.frame[:, 0], axis=0).any() or np.ptp(form.size, axis=0).any():
+    spread = max(np.ptp(form.frame[:, 0], axis=0).max(), np.ptp(form.size[:, 0]))
+    if not (form.kind == SPHERE).all() or spread > _ONE_BALL:
         return None
-    return (centre, radius) if abs(area_of(solid) / (4.0 * np.pi * radius**2) - 1.0) < 1e-9 else None
+    is_whole = area_of(solid) > 0.9 * 4.0 * np.pi * radius**2  # which is measured to 1 %
+    return (centre, radius) if is_whole else None
 
 
 def _from_ball(centre: Array, radius: float, solid: Any) -> Nearest:
-    """The nearest points of a ball and a solid."""
-    reach, _, foot, _ = _nearest(_vertex(centre), solid)
-    if reach <= radius:
+    """The nearest points of a ball and a solid.
+
+    Lemma: where the centre is outside, at a distance d from the solid, no point of one is deeper in the other than r -
+    d. A point of the solid in the ball is at least d from the centre; one of the ball is at most r - d from the ball of
+    radius d about the centre, which nothing of the solid is in.
+    """
+    depth, foot = _signed_depth(solid, occ.BRepClass3d_SolidClassifier(solid), centre)
+    if depth >= -TOLERANCE:
         return Nearest(0.0, foot, foot)
-    return Nearest(reach - radius, centre + radius / reach * (foot - centre), foot)
+    return Nearest(-depth - radius, centre - radius / depth * (foot - centre), foot, is_signed=True)
 
 
 def _nearest(a: Any, b: Any) -> Nearest:
@@ -194,18 +205,20 @@ def depths(brep: bytes, points: Array) -> Array:
     """Signed depth (k,) mm of points (k, 3) in a solid: negative outside, or where nobody knows the side."""
     shape = from_bytes(brep)
     classifier = occ.BRepClass3d_SolidClassifier(shape)
+    return np.array([_signed_depth(shape, classifier, point)[0] for point in points])
+
+
+def _signed_depth(solid: Any, classifier: Any, point: Array) -> tuple[float, Array]:
+    """The depth (mm) of a point (3,) in a solid, and the point (3,) of its surface that is nearest."""
 
     def is_outside(point: Array) -> bool:
         classifier.Perform(occ.gp_Pnt(*point.tolist()), TOLERANCE)
         return bool(classifier.State() == occ.TopAbs_State.TopAbs_OUT)
 
-    def depth(point: Array) -> float:
-        away, foot = _from_surface(shape, point)
-        # Near splines Open CASCADE errs. Beyond the foot is the other side: if it says the same of both, none counts.
-        beyond = foot + min(1.0, _BEYOND / max(away, TOLERANCE)) * (foot - point)
-        return -away if is_outside(point) or not is_outside(beyond) else away
-
-    return np.array([depth(point) for point in points])
+    away, foot = _from_surface(solid, point)
+    # Near splines Open CASCADE errs. Beyond the foot is the other side: if it says the same of both, none counts.
+    beyond = foot + min(1.0, _BEYOND / max(away, TOLERANCE)) * (foot - point)
+    return (-away if is_outside(point) or not is_outside(beyond) else away), foot
 
 
 def _from_surface(solid: Any, point: Array) -> tuple[float, Array]:

@@ -8,15 +8,21 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import OTHER, PLANE, Surfaces, height, surfaces_of
+from clamp3d.files.faces import OTHER, Surfaces, height, surfaces_of
 from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ
 from clamp3d.geometry.mesh import Array, IntArray
+from clamp3d.geometry.triangles import closest_points
 
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
 
 SAMPLED = 2.0
-"""Factor on the deviation measured at the edges' middles; 4/3 is enough where the surface is quadratic."""
+"""Factor on the deviation measured at the edges' middles of splines; 4/3 is enough where the surface is quadratic."""
+
+_FACTORS = np.array([1.0, 1.0, 1.4, 1.4, 1.4, SAMPLED])
+"""The same by kind of surface. On a cylinder, as on a circle, nothing is further than such a middle; on cones, spheres
+and tori, of which a facet is a small part, it is next to quadratic.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,13 +104,12 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
     """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `SAMPLED`."""
     kind, (middles, at) = int(form.kind[k]), (_middles(x[triangles]) for x in (points, uv))
     if kind == OTHER:
-        off = np.linalg.norm(points_on(face, at.reshape(-1, 2)) - middles.reshape(-1, 3), axis=1)
-        corner = 0.0
+        true, corner = points_on(face, at.reshape(-1, 2)), 0.0
+        off = np.linalg.norm(closest_points(np.repeat(points[triangles], 3, axis=0), true) - true, axis=1)
     else:
         off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
         corner = float(heights.max())
-    factor = 1.0 if kind == PLANE else SAMPLED
-    return np.asarray(factor * off.reshape(-1, 3).max(axis=1) + corner)
+    return np.asarray(_FACTORS[kind] * off.reshape(-1, 3).max(axis=1) + corner)
 
 
 def _middles(corners: Array) -> Array:
@@ -124,7 +129,8 @@ def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
         count = range(1, polygon.NbNodes() + 1)
         nodes, at = np.array([polygon.Node(i) - 1 for i in count]), np.array([polygon.Parameter(i) for i in count])
         true = np.array([curve.Value(t).Coord() for t in (0.5 * (at[:-1] + at[1:])).tolist()])
-        sags = SAMPLED * np.linalg.norm(true - 0.5 * (points[nodes[:-1]] + points[nodes[1:]]), axis=1)
+        factor = 1.0 if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle else SAMPLED
+        sags = factor * np.linalg.norm(true - 0.5 * (points[nodes[:-1]] + points[nodes[1:]]), axis=1)
         sag_of.update(zip(_edge_keys(nodes[:-1], nodes[1:]).tolist(), sags.tolist(), strict=True))
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))

@@ -7,21 +7,23 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from clamp3d.engine.exact import _attested, _depth_bounds, exact_overlap, exact_probe
-from clamp3d.engine.judge import kind_of_overlap
+from clamp3d.engine.answer import Distance
+from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
+from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
+from clamp3d.engine.verdict import Thresholds
 from clamp3d.files import cad_process, pairs
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
-from tests.cad import ball, moved
+from tests.cad import ball, block, moved
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
 
 
-def models(family, gap, seed=3):
-    """The two solids of a placed pair, in one frame."""
-    pair = placed_pair(family, np.random.default_rng(seed), gap, splines=0.0)
+def models(family, gap, seed=3, splines=0.0):
+    """The two solids of a placed pair, in one frame, with a share of ``splines``."""
+    pair = placed_pair(family, np.random.default_rng(seed), gap, splines=splines)
     return [model_of(BrepSolid.of(solid, name), Counters()) for solid, name in ((pair.a, "a"), (pair.b, "b"))]
 
 
@@ -118,6 +120,32 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
             assert nearest.distance == pytest.approx(gap, abs=1e-6)
         assert np.linalg.norm(nearest.q - nearest.p) == pytest.approx(nearest.distance, abs=1e-9)
     assert not (known and missed)
+
+
+@pytest.mark.parametrize("splines", [0.0, 1.0])
+@pytest.mark.parametrize("family", ["balls", "ball_on_plate", "ball_in_socket", "ball_in_cone", "ball_in_ring"])
+def test_the_overlap_of_a_ball_is_its_radius_less_the_distance_of_its_centre(family, splines):
+    for seed, gap in ((1, -0.0098), (2, -1e-4), (3, 0.0), (4, 0.03)):
+        a, b = models(family, gap, seed, splines)
+        distance = exact_distance(a, b, np.eye(4))
+        assert distance.lower <= gap <= distance.upper
+        assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
+
+
+def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
+    for z in (-1.0, 0.0):  # 1 mm below a face of a block, and on it
+        a, b = (model_of(BrepSolid.of(solid, "a"), Counters()) for solid in (ball(2.0, z), block((-9, -9, -9), (9, 9, 0))))
+        assert exact_distance(a, b, np.eye(4)).lower == exact_distance(b, a, np.eye(4)).lower == -np.inf
+
+
+@pytest.mark.parametrize("splines", [0.0, 1.0])
+@pytest.mark.parametrize("family", ["pin_in_hole", "tube_in_tube", "nut_on_plate", "boxes_face_to_face"])
+def test_that_faces_coincide_is_proven_by_meshes(family, splines):
+    a, b = models(family, 0.0, splines=splines)
+    verdict, distance = judge(a, b, np.eye(4), Distance(level="boxes"), Thresholds(), None)
+    assert (verdict.value, distance.level) == ("contact", "meshes")
+    assert -0.01 <= distance.lower <= 0.0 <= distance.upper <= 0.01
+    assert a.counters.queries["exact"] == 0
 
 
 @pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])

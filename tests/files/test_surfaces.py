@@ -1,0 +1,80 @@
+"""Surfaces of CAD faces, splines among them, and how far their triangles are from them, against Open CASCADE alone."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
+
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_NurbsConvert
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.gp import gp_Pnt
+
+from clamp3d.files import faces
+from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
+from clamp3d.files.open_cascade import explore, from_bytes, to_bytes
+from clamp3d.files.tessellation import tessellate
+from tests.cad import ball, block, cone, cut, first_solid, moved, random_pose, ring, rod
+from tests.public.placed_pairs import arch
+
+SOLIDS = {
+    "drilled": (cut(block((-9, -9, 0), (9, 9, 4)), rod(3, -1, 5)), {PLANE, CYLINDER}),
+    "cone": (cone(5, 2, 0, 7), {PLANE, CONE}),
+    "hollow": (cut(block((-9, -9, -9), (9, 9, 9)), ball(5)), {PLANE, SPHERE}),
+    "ring": (ring(8, 2), {TORUS}),
+    "arch": (arch(9, 4, 12), {PLANE, OTHER}),
+}
+
+
+def as_splines(shape):
+    return BRepBuilderAPI_NurbsConvert(shape, True).Shape()
+
+
+def off_face(face, points):
+    """Distance (k,) of points (k, 3) from a face by Open CASCADE, mm."""
+    vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex() for point in points)
+    return np.array([BRepExtrema_DistShapeShape(face, vertex).Value() for vertex in vertices])
+
+
+@pytest.mark.parametrize("splines", [False, True])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines):
+    shape, kinds = SOLIDS[name]
+    brep = to_bytes(first_solid(moved(as_splines(shape) if splines else shape, random_pose(np.random.default_rng(2)))))
+    triangles, form = tessellate(brep, 0.05), faces.surfaces(brep)
+    assert set(form.kind.tolist()) == (kinds - {TORUS} | {OTHER} if splines and TORUS in kinds else kinds)
+    corners = triangles.vertices[triangles.faces]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for k in np.flatnonzero(form.kind != OTHER):
+        rows = triangles.face == k
+        data = int(form.kind[k]), form.frame[k], form.size[k]
+        assert np.abs(height(*data, corners[rows].reshape(-1, 3))).max() < 1e-9
+        step = 1e-3 * outward[rows] / np.linalg.norm(outward[rows], axis=1, keepdims=True)
+        middles = corners[rows].mean(axis=1)
+        rises = height(*data, middles + step) - height(*data, middles - step)
+        assert (form.sense[k] * rises > 1e-3).all()
+
+
+def test_what_is_only_nearly_a_sphere_is_none():
+    round_, egg = (first_solid(as_splines(ball(5))) for _ in range(2))
+    for solid, bump in ((round_, 0.0), (egg, 1e-5)):
+        surface = next(explore(solid, "FACE"))
+        spline = faces.occ.BRep_Tool.Surface_s(surface)
+        spline.SetPole(3, 2, spline.Pole(3, 2).Translated(faces.occ.gp_Vec(0, 0, bump)))
+        assert faces.surfaces(to_bytes(solid)).kind.tolist() == [OTHER if bump else SPHERE]
+
+
+@pytest.mark.parametrize("splines", [False, True])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_no_triangle_is_further_from_its_face_than_its_error(name, splines):
+    shape = first_solid(as_splines(SOLIDS[name][0]) if splines else SOLIDS[name][0])
+    brep = to_bytes(shape)
+    triangles, every = tessellate(brep, 0.05), [*explore(from_bytes(brep), "FACE")]
+    rng = np.random.default_rng(5)
+    curved = np.flatnonzero(triangles.errors > 1e-9)
+    worst = curved[np.argsort(triangles.errors[curved])[:: max(1, len(curved) // 30)]]
+    for row in worst:
+        corners = triangles.vertices[triangles.faces[row]]
+        middles = 0.5 * (corners + np.roll(corners, 1, axis=0))
+        points = np.vstack([rng.dirichlet(np.ones(3), 9) @ corners, corners.mean(axis=0), middles])
+        assert off_face(every[triangles.face[row]], points).max() <= triangles.errors[row] + 1e-7
+    assert triangles.errors.max() < 0.15
