@@ -134,7 +134,9 @@ def test_the_overlap_of_a_ball_is_its_radius_less_the_distance_of_its_centre(fam
 
 def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
     for z in (-1.0, 0.0):  # 1 mm below a face of a block, and on it
-        a, b = (model_of(BrepSolid.of(solid, "a"), Counters()) for solid in (ball(2.0, z), block((-9, -9, -9), (9, 9, 0))))
+        a, b = (
+            model_of(BrepSolid.of(solid, "a"), Counters()) for solid in (ball(2.0, z), block((-9, -9, -9), (9, 9, 0)))
+        )
         assert exact_distance(a, b, np.eye(4)).lower == exact_distance(b, a, np.eye(4)).lower == -np.inf
 
 

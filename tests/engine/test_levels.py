@@ -139,7 +139,7 @@ def test_triangles_are_outside_only_where_no_point_of_them_is_inside():
     assert not (outside & touched).any()
     assert outside.sum() > 50  # of those whose middle is nearest to an edge the side is not known
     on_top = np.array([[[1.0, 1.0, 20.0], [4.0, 1.0, 20.0], [1.0, 9.0, 20.0]]])
-    assert one.is_outside(on_top + [0.0, 0.0, 1e-6]).all()
+    assert one.is_outside(on_top + np.array([0.0, 0.0, 1e-6])).all()
     assert not one.is_outside(on_top).any()
     for unknown in (Surface(one.vertices, one.faces[1:]), Surface(one.vertices, one.faces, is_simple=False)):
         assert not unknown.is_outside(triangles).any()
@@ -148,7 +148,7 @@ def test_triangles_are_outside_only_where_no_point_of_them_is_inside():
 
 def test_where_contacts_may_be_missing_no_triangle_is_outside(monkeypatch):
     one, across = Surface(BRACKET.vertices, BRACKET.faces), np.array([[[-9.0, 3, 5], [60.0, 3, 5], [20.0, 3, 9]]])
-    apart = across + [0.0, 0.0, 40.0]
+    apart = across + np.array([0.0, 0.0, 40.0])
     assert one.is_outside(np.concatenate([across, apart])).tolist() == [False, True]
     monkeypatch.setattr("clamp3d.engine.surface._CONTACTS", 1)
     assert one.is_outside(np.concatenate([across, apart])).tolist() == [False, False]
