@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from clamp3d import cli
+from clamp3d import assemble, cli
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
 
 # Tests start Python many times: without bytecode each process would compile the package again.
@@ -79,6 +79,12 @@ def pytest_collection():
     finally:
         gc.enable()
         gc.freeze()
+
+
+@pytest.fixture(scope="session")
+def run():
+    """The reference clamp, assembled."""
+    return assemble()
 
 
 def main_in_this_process(monkeypatch, captured):

@@ -22,11 +22,6 @@ from clamp3d.cli.bench import MeasureImage
 
 
 @pytest.fixture(scope="module")
-def run():
-    return assemble(load_clamp(), Cas())
-
-
-@pytest.fixture(scope="module")
 def shown(run):
     return picture(run, PX_PER_MM)
 

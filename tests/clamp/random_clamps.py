@@ -5,7 +5,6 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from outlines import Outlines
 
 from clamp3d import load_clamp
 from clamp3d.baselines import Cas
@@ -16,6 +15,7 @@ from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import D, Section
 from clamp3d.errors import SolverError
+from tests.clamp.outlines import Outlines
 
 OPTIMISER = 1e-5
 """Mm to which the optimiser on points agrees."""

@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from orders import manifold
-from outlines import outline
 from scipy.spatial import cKDTree
 
-from clamp3d import InputError, assemble, load_clamp, placement
+from clamp3d import InputError, load_clamp, placement
 from clamp3d.baselines import Cas
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.parts import parts
@@ -19,6 +17,8 @@ from clamp3d.clamp.section import WIRES, Section
 from clamp3d.errors import NotClampedError
 from clamp3d.kernel import rotation
 from clamp3d.output.placement_report import capture_figure
+from tests.clamp.orders import manifold
+from tests.clamp.outlines import outline
 
 COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "16"))
 STIFF = 4.0
@@ -179,27 +179,22 @@ def test_a_range_is_caught_only_where_every_place_with_room_is():
     assert CaptureMap(np.arange(6.0), np.zeros(2), np.full((2, 6), o, dtype=np.int8)).captured is None
 
 
-@pytest.fixture(scope="module")
-def final():
-    return assemble()
-
-
-def test_a_pitched_wire_opens_by_its_lift_at_the_ends(final):
+def test_a_pitched_wire_opens_by_its_lift_at_the_ends(run):
     """A wire pitched by a lifts either splint of half length 30 by 30 tan a, less what its own leaning takes back."""
     for a in (0.002, 0.008, 0.02):
-        opening, _ = close_on(final, "P6", np.array([[0.0, a]]))
+        opening, _ = close_on(run, "P6", np.array([[0.0, a]]))
         assert opening[0] == pytest.approx(2 * 30.0 * math.tan(a), rel=0.06)
 
 
-def test_the_opening_of_a_yawed_wire_is_that_of_meshes(final):
+def test_the_opening_of_a_yawed_wire_is_that_of_meshes(run):
     """Each splint moved out by its share just parts from the wire, by manifold3d's volumes."""
     yaw = 0.05
-    opening, _ = close_on(final, "P6", np.array([[yaw, 0.0]]))
-    solids = parts(final.clamp)
-    wire = manifold(solids["P6"], final.T_world("P6") @ rotation((0.0, 0.0, 1.0), yaw), 1e-3)
+    opening, _ = close_on(run, "P6", np.array([[yaw, 0.0]]))
+    solids = parts(run.clamp)
+    wire = manifold(solids["P6"], run.T_world("P6") @ rotation((0.0, 0.0, 1.0), yaw), 1e-3)
     needed = 0.0
     for name, up in (("P1", 1.0), ("P2", -1.0)):
-        still = manifold(solids[name], final.T_world(name), 1e-3)
+        still = manifold(solids[name], run.T_world(name), 1e-3)
         low, high = -1.0, 5.0
         while high - low > 1e-3:
             middle = 0.5 * (low + high)
@@ -209,12 +204,12 @@ def test_the_opening_of_a_yawed_wire_is_that_of_meshes(final):
     assert opening[0] == pytest.approx(needed, abs=0.02)
 
 
-def test_limits_are_where_it_no_longer_closes(final):
+def test_limits_are_where_it_no_longer_closes(run):
     found = placement(columns=4)
     for k, limit in enumerate(found.limits):
         turns = np.zeros((4, 2))
         turns[:, k] = [end * share for share in (1.0 - 1e-6, 1.0 + 1e-6) for end in (limit.low, limit.high)]
-        opening, in_grooves = close_on(final, "P6", turns)
+        opening, in_grooves = close_on(run, "P6", turns)
         assert (in_grooves & (opening <= found.seat_tolerance)).tolist() == [True, True, False, False]
     assert [limit.reach for limit in found.limits] == [0.1, 0.05]
     narrow = placement(columns=4, yaw=0.01, pitch=0.001).limits

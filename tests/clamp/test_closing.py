@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from outlines import Outlines
-from random_clamps import check_clamps, whole_clamp
 from shapely import LineString
 
 from clamp3d import assemble, load_clamp
@@ -14,6 +12,8 @@ from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import EDGES, D, Section, U, W
+from tests.clamp.outlines import Outlines
+from tests.clamp.random_clamps import check_clamps, whole_clamp
 
 
 def test_an_optimiser_and_a_grid_agree():
@@ -85,8 +85,7 @@ def test_play_lets_the_reference_clamp_close_further(joints, distance):
     assert x == pytest.approx(0.0, abs=1e-9)  # nothing sideways is left over that no contact carries
 
 
-def test_forces_on_each_wire_and_on_the_down_splint_balance():
-    run = assemble()
+def test_forces_on_each_wire_and_on_the_down_splint_balance(run):
     for part in ("P6", "P7", "P2"):
         total = sum(f.force * f.direction * ((f.b == part) - (f.a == part)) for f in run.forces)
         assert np.allclose(total, 0.0, atol=1e-9), part

@@ -36,20 +36,19 @@ def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(line, j
             assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
 
 
-def test_reference_differs_from_its_matrix_where_the_bolt_has_play():
-    assembly = assemble()
-    assert [(d.a, d.b, d.declared, d.measured) for d in assembly.matrix_differences] == [
+def test_reference_differs_from_its_matrix_where_the_bolt_has_play(run):
+    assert [(d.a, d.b, d.declared, d.measured) for d in run.matrix_differences] == [
         ("P1", "P4", 2, 0),
         ("P2", "P4", 2, 0),
     ]
     assert "P1-P4 (up splint, bolt) declared 2 (convex object collision) but does not touch: 1.000 mm apart" in str(
-        assembly.matrix_differences[0]
+        run.matrix_differences[0]
     )
-    assert {pair: c.type for pair, c in assembly.matrix.items()} == {
+    assert {pair: c.type for pair, c in run.matrix.items()} == {
         ("P1", "P5"): 2, ("P1", "P6"): 3, ("P1", "P7"): 3, ("P2", "P3"): 3,
         ("P2", "P6"): 3, ("P2", "P7"): 3, ("P3", "P4"): 2, ("P4", "P5"): 1,
     }  # fmt: skip
-    found = {(c.a, c.b): c for c in assembly.contacts}
+    found = {(c.a, c.b): c for c in run.contacts}
     # Measured on the exported STEP by Open CASCADE; the slot is 1 mm longer than the bolt.
     assert found["P1", "P2"].gap == pytest.approx(3.729354, abs=1e-6)
     for pair in (("P1", "P4"), ("P2", "P4")):
@@ -105,21 +104,20 @@ def test_the_bolt_stops_wires_and_is_named():
     assert {(f.a, f.b) for f in assembly.forces if f.force > 0.1} >= {("P4", "P6"), ("P4", "P7")}
 
 
-def test_plain_data_and_frame():
+def test_plain_data_and_frame(run):
     pandas = pytest.importorskip("pandas")
-    assembly = assemble()
-    data = json.loads(json.dumps(assembly.to_dict(), allow_nan=False))
+    data = json.loads(json.dumps(run.to_dict(), allow_nan=False))
     assert len(data["contacts"]) == 21
     assert {"status", "distance_mm", "parts", "contacts", "seats", "events", "residuals", "work"} <= set(data)
-    assert data["parts"]["P2"]["T_world"][0][3] == pytest.approx(assembly.poses["P2"].x)
+    assert data["parts"]["P2"]["T_world"][0][3] == pytest.approx(run.poses["P2"].x)
     assert data["tilt_deg"] == data["path"][-1]["parts"]["P2"]["angle_deg"] == pytest.approx(12.0, abs=0.01)
-    up, line, jumper = (assembly.path[4].poses[name] for name in ("P1", "P6", "P7"))
+    up, line, jumper = (run.path[4].poses[name] for name in ("P1", "P6", "P7"))
     start = [pytest.approx((wire.x - up.x, wire.y - up.y)) for wire in (line, jumper)]
     assert [data["start"]["line"], data["start"]["jumper"]] == start
-    frame = assembly.frame()
+    frame = run.frame()
     assert isinstance(frame, pandas.DataFrame)
-    assert frame["distance_mm"].tolist() == [c.gap for c in assembly.contacts]
-    assert "P1-P2" in assembly._repr_html_()
+    assert frame["distance_mm"].tolist() == [c.gap for c in run.contacts]
+    assert "P1-P2" in run._repr_html_()
 
 
 def test_a_contact_model_measures_its_own_contacts():
@@ -131,9 +129,9 @@ def test_a_contact_model_measures_its_own_contacts():
     assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
 
 
-def test_moved_parts_are_named_in_the_papers_words():
+def test_moved_parts_are_named_in_the_papers_words(run):
     """Bolt and hole as in Table 2, an arc and its wire as in Table 3; what the paper has no word for is plain."""
-    clamp, home = load_clamp(), {name: replace(pose, along=0.5) for name, pose in assemble().poses.items()}
+    clamp, home = load_clamp(), {name: replace(pose, along=0.5) for name, pose in run.poses.items()}
     up, down, one_side = clamp.up_splint, clamp.down_splint, "two points on one side"
     face = home["P1"].y + up.thickness
     level, tilt = face - home["P2"].y - down.face_depth, home["P2"].angle  # where the splints' faces meet untilted

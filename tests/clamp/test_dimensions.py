@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_clamps import whole_clamp
 
 from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import Wire
+from tests.clamp.random_clamps import whole_clamp
 
 
 def test_wrong_values_in_python_are_one_line_too():

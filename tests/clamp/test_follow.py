@@ -6,8 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from orders import manifold
-from random_clamps import whole_clamp
 
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
@@ -19,6 +17,8 @@ from clamp3d.clamp.ways import Insertion
 from clamp3d.errors import SequenceError
 from clamp3d.kernel import translation
 from clamp3d.output.report import make_report
+from tests.clamp.orders import manifold
+from tests.clamp.random_clamps import whole_clamp
 
 SCREW = ("P4", "P5")  # one diameter, so facets overlap all around
 TOUCHING = 5.0  # mm3 that facets of parts in contact overlap by; a sheet of 0.01 mm between two parts' ends is more
@@ -33,17 +33,6 @@ def volume(a, T_a, b, T_b):
     """What two parts share, mm3."""
     placed = [bodies()[name].transform(T[:3]) for name, T in ((a, T_a), (b, T_b))]
     return (placed[0] ^ placed[1]).volume()
-
-
-@cache
-def reference():
-    return assemble("reference")
-
-
-@cache
-def at_once():
-    """The nut draws all that is below it."""
-    return assemble(replace(load_clamp(), sequence="P1|P2P3P4P5 -> P7 -> P5|P2P3P4"))
 
 
 def overlaps_on(path, steps=3):
@@ -69,11 +58,11 @@ def overlaps_on(path, steps=3):
         "P4|P3 -> P2 -> P1 -> P5 -> P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4",
     ],
 )
-def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(sequence):
-    run = assemble("reference", sequence=sequence)
+def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(sequence, run):
+    published, run = run, assemble("reference", sequence=sequence)
     assert run.status == "clamped"
-    assert run.distance == reference().distance
-    assert run.poses == reference().poses
+    assert run.distance == published.distance
+    assert run.poses == published.poses
     assert run.undeclared == ()
     assert overlaps_on(run.path) < TOUCHING
     first = run.path[0].poses
@@ -86,8 +75,8 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
     assert len({w.step for w in run.path}) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
 
 
-def test_the_papers_own_motions_overlap_nowhere():
-    assert overlaps_on(reference().path) < TOUCHING
+def test_the_papers_own_motions_overlap_nowhere(run):
+    assert overlaps_on(run.path) < TOUCHING
 
 
 @pytest.mark.parametrize(
@@ -131,7 +120,8 @@ def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_f
 
 
 def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
-    run = at_once()
+    """The nut draws all that is below it."""
+    run = assemble(replace(load_clamp(), sequence="P1|P2P3P4P5 -> P7 -> P5|P2P3P4"))
     made = make_report(run)
     assert [row.turns for row in made.steps][:5] == [0.0] * 5
     assert made.steps[-1].turns == pytest.approx(run.turns)

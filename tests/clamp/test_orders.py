@@ -3,20 +3,20 @@
 import os
 
 import numpy as np
-from orders import has_way, open_bodies, questions
 
-from clamp3d import assemble, load_clamp
+from clamp3d import load_clamp
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.ways import DIRECTIONS, Insertion, out
 from clamp3d.engine.model import ModelCache
+from tests.clamp.orders import has_way, open_bodies, questions
 
 COUNT = int(os.environ.get("CLAMP3D_ORDERS", "4"))
 """How many of the 192 questions are put to the search: each takes some seconds."""
 
 
-def test_the_search_finds_a_way_where_there_is_one():
+def test_the_search_finds_a_way_where_there_is_one(run):
     asked = list(questions())
-    place = {name: assemble().path[4].T_world(name) for name in PARTS}
+    place = {name: run.path[4].T_world(name) for name in PARTS}
     clamp, cache = load_clamp(), ModelCache()
     for k in np.random.default_rng(3).permutation(len(asked))[:COUNT]:
         part, others = asked[k]

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clamp3d import InputError, assemble, load_clamp
+from clamp3d import InputError, assemble
 from clamp3d.baselines import Cas
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.sequence import as_published, parse_sequence
@@ -31,8 +31,7 @@ def test_a_sequence_that_closes_no_clamp_is_refused(text, message):
         parse_sequence(text)
 
 
-def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say():
-    run = assemble(load_clamp(), Cas())
+def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say(run):
     clamp, path = run.clamp, [w.poses for w in run.path]
     assert [w.label for w in run.path] == [
         *("open clamp beside the line", "line between the splints", "up splint rests on the line"),
@@ -83,20 +82,19 @@ def test_only_the_papers_own_steps_are_as_published():
 
 
 @pytest.mark.parametrize("lacking", [-0.01, 0.01, 30.0, 67.0])
-def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking):
-    clamp, poses = load_clamp(), assemble(load_clamp(), Cas()).poses
+def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking, run):
+    clamp, poses = run.clamp, run.poses
     through = clamp.bolt.shank_length + poses["P4"].y - poses["P5"].y  # its end flush with the nut's free face
-    run = assemble(replace(clamp, bolt=replace(clamp.bolt, shank_length=through - lacking)), Cas())
+    made = assemble(replace(clamp, bolt=replace(clamp.bolt, shank_length=through - lacking)), Cas())
     short = f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
-    assert run.status == ("clamped" if lacking < 0.0 else short)
-    gaps = {(c.a, c.b): c.gap for c in run.contacts}
-    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - run.clamp.nut.height), abs=1e-6)
+    assert made.status == ("clamped" if lacking < 0.0 else short)
+    gaps = {(c.a, c.b): c.gap for c in made.contacts}
+    assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - clamp.nut.height), abs=1e-6)
     assert np.isfinite(list(gaps.values())).all()
 
 
-def test_scenes_are_the_parts_at_their_poses():
-    assembly = assemble()
-    for waypoint in (assembly.path[0], assembly.path[-1]):
-        placed = {part.name: part.T_world.tolist() for part in assembly.scene_at(waypoint).parts}
+def test_scenes_are_the_parts_at_their_poses(run):
+    for waypoint in (run.path[0], run.path[-1]):
+        placed = {part.name: part.T_world.tolist() for part in run.scene_at(waypoint).parts}
         assert placed == {f"P{k}": waypoint.T_world(f"P{k}").tolist() for k in range(1, 8)}
-    assert all(np.array_equal(part.T_world, assembly.T_world(part.name)) for part in assembly.scene.parts)
+    assert all(np.array_equal(part.T_world, run.T_world(part.name)) for part in run.scene.parts)

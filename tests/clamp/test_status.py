@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from random_clamps import whole_clamp
 
 from clamp3d import assemble, monte_carlo, placement, sensitivity
 from clamp3d.clamp.parts import parts
 from clamp3d.errors import NotClampedError, SolverError, without_numbers
 from clamp3d.geometry.profile import Arc
+from tests.clamp.random_clamps import whole_clamp
 
 COMMANDS = ("run", "check", "tolerance --n 1", "sweep --steps 4", "report -o", "export -o", "view --html")
 FIRST = {0: "faces meet", 8: "lies beside", 12: "clamped", 14: "the bolt stops", 24: "the saddle's edge stops"}

@@ -11,7 +11,7 @@ import pytest
 from legends import friction_figure
 from scipy.optimize import brentq, linprog
 
-from clamp3d import InputError, assemble, load_clamp
+from clamp3d import InputError, load_clamp
 from clamp3d.baselines import Cas
 from clamp3d.clamp import loader
 from clamp3d.clamp.dimensions import Limits
@@ -21,11 +21,6 @@ from clamp3d.clamp.torque import tighten, torque_per_newton
 from clamp3d.output.forces_report import measured_to_text
 
 REFERENCE = load_clamp()
-
-
-@pytest.fixture(scope="module")
-def run():
-    return assemble()
 
 
 @pytest.fixture(scope="module")

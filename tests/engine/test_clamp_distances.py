@@ -44,8 +44,8 @@ def test_all_pairs_agree_with_open_cascade(line, jumper):
             assert abs(max(form.depth(local)[0] for form in CACHE.model(part.shape).bodies)) <= 1e-9, (a, b, name)
 
 
-def test_the_reference_clamp():
-    scene = assemble().scene
+def test_the_reference_clamp(run):
+    scene = run.scene
     found = measure(scene, cache=CACHE)
     assert found["P1", "P2"].value == pytest.approx(3.729354, abs=1e-6)
     assert found["P2", "P4"].value == pytest.approx(1.0, abs=1e-9)

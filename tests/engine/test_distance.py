@@ -8,7 +8,7 @@ import pytest
 import shapely
 import trimesh
 
-from clamp3d import Distance, Verdict, assemble, distance, measure, shapes
+from clamp3d import Distance, Verdict, distance, measure, shapes
 from clamp3d.baselines import contact_model
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.result import PairResult
@@ -65,18 +65,16 @@ def test_unique_is_not_claimed_where_rounding_decides(tilt):
     assert distance(shapes.box((10, 10, 10)), cube, translation(0, 0, 9) @ rotation([1, 2, 0], tilt)).unique is not True
 
 
-def test_a_bolt_whose_axis_lies_in_the_plane_between_the_halves_of_a_hole():
-    clamp = assemble()
-    splint, bolt = parts(clamp.clamp)["P1"], parts(clamp.clamp)["P4"]
-    found = distance(bolt, splint, inverse(clamp.scene.parts[3].T_world))
+def test_a_bolt_whose_axis_lies_in_the_plane_between_the_halves_of_a_hole(run):
+    splint, bolt = parts(run.clamp)["P1"], parts(run.clamp)["P4"]
+    found = distance(bolt, splint, inverse(run.scene.parts[3].T_world))
     assert found.lower <= found.upper < -1.0
 
 
 @pytest.mark.parametrize("name", ["chords", "wedges"])
-def test_contact_models_answer_where_a_groove_is_nearest(name):
-    clamp = assemble()
-    model = contact_model(name, parts(clamp.clamp), unit_angle=math.radians(5.0))
-    exact, asked = measure(clamp.scene), measure(clamp.scene, model=model)
+def test_contact_models_answer_where_a_groove_is_nearest(name, run):
+    model = contact_model(name, parts(run.clamp), unit_angle=math.radians(5.0))
+    exact, asked = measure(run.scene), measure(run.scene, model=model)
     grooves = {pair for pair, d in asked.items() if d.method == name}
     assert grooves == {("P1", "P6"), ("P1", "P7"), ("P2", "P6"), ("P2", "P7"), ("P2", "P3")}
     for pair, d in asked.items():

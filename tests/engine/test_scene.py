@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d import Distance, InputError, Motion, Part, Scene, Verdict, assemble, check_poses, shapes
+from clamp3d import Distance, InputError, Motion, Part, Scene, Verdict, check_poses, shapes
 from clamp3d.engine.broad import Boxes, near_pairs
 from clamp3d.engine.check import check
 from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds
@@ -29,9 +29,9 @@ BOX = shapes.box((1, 1, 1))
 
 
 @pytest.fixture(scope="module")
-def clamp():
+def clamp(run):
     """The assembled reference clamp, none of whose contacts is allowed."""
-    return replace(assemble().scene, allowed=(), clearance=0.5)
+    return replace(run.scene, allowed=(), clearance=0.5)
 
 
 @pytest.fixture(scope="module")

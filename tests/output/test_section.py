@@ -8,18 +8,13 @@ import pytest
 from legends import table2_figure
 from matplotlib.figure import Figure
 
-from clamp3d import InputError, assemble, load_clamp
+from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.parts import parts
 from clamp3d.output.assembly_figures import exploded_figure, exploded_poses, steps_figure
 from clamp3d.output.figures import contact_figure, contacts_figure, save_figure, section_figure, states_figure
 from clamp3d.output.palette import PART_COLOURS
 from clamp3d.output.section import draw_section, edge_openings
-
-
-@pytest.fixture(scope="module")
-def run():
-    return assemble()
 
 
 def texts(figure):

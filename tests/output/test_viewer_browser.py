@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import clamp3d.output.viewer
-from clamp3d import Motion, Scene, assemble, check, fit_mesh, measure, shapes, view
+from clamp3d import Motion, Scene, check, fit_mesh, measure, shapes, view
 from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.kernel import translation
 from clamp3d.output.fit_report import fit_to_html
@@ -340,9 +340,8 @@ def test_findings_can_be_read_without_webgl_or_script(browser, hinge, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def served(browser):
+def served(browser, run):
     """The viewer of the reference clamp and its page, which was open before the clamp was assembled; and the run."""
-    run = assemble("reference")
     with Viewer(ClampStory(run.clamp), PageServer(), mesh_error=0.1) as viewer:
         viewer.show(run.path[0])
         page = open_page(browser, viewer.url)

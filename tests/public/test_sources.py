@@ -65,9 +65,8 @@ def test_what_is_no_source_is_refused_in_one_line(source, message):
         assert "\n" not in str(refused.value)
 
 
-def test_results_can_be_pickled(boxes):
+def test_results_can_be_pickled(boxes, run):
     result = clamp3d.check(boxes["scene"])
     again = pickle.loads(pickle.dumps(result))
     assert again.to_dict() == result.to_dict()
-    assembly = clamp3d.assemble()
-    assert pickle.loads(pickle.dumps(assembly)).distance == assembly.distance
+    assert pickle.loads(pickle.dumps(run)).distance == run.distance
