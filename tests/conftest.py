@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from clamp3d import assemble, cli
+from clamp3d import assemble
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, groove_pieces, signed_distance, translation
+from tests.command import call
 
 # Tests start Python many times: without bytecode each process would compile the package again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -87,25 +88,18 @@ def run():
     return assemble()
 
 
-def main_in_this_process(monkeypatch, captured):
-    """A function that calls the command line: code, stdout, stderr, as ``capsys`` or ``capfd`` has captured them."""
+@pytest.fixture
+def main():
+    """The command line in this process: code, stdout, stderr."""
+    return call
+
+
+@pytest.fixture
+def whole_main(capfd):
+    """``main`` with what libraries write past Python: all that a process would write to its stdout and stderr."""
 
     def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["clamp3d", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, *captured.readouterr()
+        code, *said = call(*arguments)
+        return code, *map(str.__add__, said, capfd.readouterr())
 
     return run
-
-
-@pytest.fixture
-def main(monkeypatch, capsys):
-    """The command line in this process, where a new one would only import everything again: code, stdout, stderr."""
-    return main_in_this_process(monkeypatch, capsys)
-
-
-@pytest.fixture
-def whole_main(monkeypatch, capfd):
-    """``main`` with what libraries write past Python: all that a process would write to its stdout and stderr."""
-    return main_in_this_process(monkeypatch, capfd)

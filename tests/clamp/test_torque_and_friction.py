@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,10 @@ REFERENCE = load_clamp()
 
 @pytest.fixture(scope="module")
 def finder():
-    return FrictionBand(REFERENCE)
+    """Its bands are calculated once."""
+    made = FrictionBand(REFERENCE)
+    made.band, made.friction_for = cache(made.band), cache(made.friction_for)
+    return made
 
 
 @pytest.mark.parametrize(
@@ -258,7 +262,8 @@ def test_clamp_with_a_wire_outside_its_arcs_is_refused():
         FrictionBand(load_clamp(line="LJ-16", jumper="LJ-16"))
 
 
-def test_command(main):
+def test_command(finder, monkeypatch, main):
+    monkeypatch.setattr("clamp3d.clamp.friction.FrictionBand", lambda _: finder)  # with its own: docs/usage.md
     code, out, _ = main("run", "--quiet", "--no-equilibria", "--torque", "80", "--measured", "31.63", "--json", "-")
     data = json.loads(out)
     assert (code, data["torque"]["torque_nm"]) == (0, 80.0)

@@ -7,14 +7,12 @@
 """
 
 import doctest
-import io
 import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import click
@@ -24,6 +22,7 @@ from sybil.example import SybilFailure
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
 from clamp3d import cli
+from tests.command import call
 from tests.docs.project import PAGES, ROOT
 
 PYTHON = shlex.quote(sys.executable)
@@ -37,14 +36,10 @@ def in_bash(command):
 
 
 def in_process(command):
-    """A command that asks nothing of the shell, where a new process would only import everything again."""
-    words, out, err = shlex.split(command), io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", words)
+    """A command that asks nothing of the shell."""
+    with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", ENVIRONMENT["COLUMNS"])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-    return subprocess.CompletedProcess(words, stop.value.code, out.getvalue(), err.getvalue())
+        return subprocess.CompletedProcess(command, *call(*shlex.split(command)[1:]))
 
 
 def console(example):

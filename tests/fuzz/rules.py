@@ -1,19 +1,16 @@
 """What holds for every call of the command line, whatever its input: exit code, one line on stderr, files whole."""
 
-import io
 import json
 import os
 import re
-import sys
 import tempfile
-from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import chdir, contextmanager
 from pathlib import Path
-from unittest import mock
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from clamp3d import cli
+from tests import command
 
 TIMES = int(os.environ.get("CLAMP3D_FUZZ", "0"))
 """How many times as many inputs are drawn, and others each time; 0: the same few every time."""
@@ -48,18 +45,9 @@ def new_folder():
 
 def call(arguments):
     """Run ``clamp3d ARGUMENTS`` in this process; its exit code and stdout."""
-    out, err = io.TextIOWrapper(io.BytesIO(), "utf-8"), io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace")
-    with redirect_stdout(out), redirect_stderr(err), mock.patch.object(sys, "argv", ["clamp3d", *arguments]):
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-    texts = []
-    for stream in (out, err):
-        stream.flush()
-        texts.append(stream.buffer.getvalue().decode("utf-8", "replace"))
-    assert_rules(code, texts[1])
-    return code, texts[0]
+    code, out, err = command.call(*arguments)
+    assert_rules(code, err)
+    return code, out
 
 
 def assert_rules(code, stderr):

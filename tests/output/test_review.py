@@ -2,11 +2,11 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+
+from tests.command import call
 
 pytest.importorskip("bd_warehouse", reason="bd_warehouse (extra dev) is not installed")
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
@@ -28,11 +28,10 @@ def faulty(tmp_path_factory):
     """A folder with its shaft 0.03 mm too thick, checked."""
     folder = tmp_path_factory.mktemp("review")
     files = [f"--{kind}={folder / name}" for kind, name in (("json", "a.json"), ("csv", "a.csv"), ("bcf", "a.bcfzip"))]
-    command = [sys.executable, "-m", "clamp3d", "check", str(bearing(folder / "bearing.step", 4.03)), "-q", *files]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (1, "")
+    code, out, err = call("check", bearing(folder / "bearing.step", 4.03), "-q", *files)
+    assert (code, err) == (1, "")
     pattern = r"InnerRace and Shaft clash: interference 0\.03 mm, apart after a move of up to 10\.\d+ mm; "
-    assert re.search(pattern, done.stdout)
+    assert re.search(pattern, out)
     return folder
 
 

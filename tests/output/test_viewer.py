@@ -365,10 +365,10 @@ def test_run_with_view_prints_its_result_and_ends_after_the_timeout(tmp_path, ma
 
 def test_a_blocked_sequence_is_shown_on_one_page(tmp_path, main):
     page = tmp_path / "page.html"
-    order = "P1|P2P3P4P5 -> P2 -> P7"
+    order = "P1|P2P3P4P5 -> P7 -> P5|P3P4"
     code, out, _ = main("run", "--view", "--timeout", "0", "--html", page, "--sequence", order)
     assert code == 1
     said, *shown = out.splitlines()
-    assert said.startswith("not assembled: sequence step 3, P7")
+    assert said.startswith("not assembled: sequence step 3, P5|P3P4")
     assert sum(line.startswith("http://") for line in shown) == 1
-    assert "P7 from" in page.read_text()
+    assert "P3 from below" in page.read_text()
