@@ -1,7 +1,9 @@
 """Solids and STEP assemblies made by Open CASCADE alone: nothing of clamp3d is used here."""
 
 import numpy as np
+from OCP.Bnd import Bnd_Box
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepPrimAPI import (
@@ -100,11 +102,18 @@ def first_solid(shape):
     return solids_of(shape)[0]
 
 
-def volume(shape):
-    """mm^3."""
+def volume(shape, *accuracy):
+    """mm^3; to a relative ``accuracy``, or to Open CASCADE's default."""
     properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
+    BRepGProp.VolumeProperties_s(shape, properties, *accuracy)
     return properties.Mass()
+
+
+def bounds(shape):
+    """Tight box (2, 3) of a shape, arcs taken as arcs."""
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return np.array([point.Coord() for point in (box.CornerMin(), box.CornerMax())])
 
 
 def common_volume(a, b):
@@ -154,15 +163,6 @@ class Tree:
         finally:
             Interface_Static.SetCVal_s("write.step.unit", before)
         return path
-
-
-def write_parts(path, **parts):
-    """A STEP file of named solids, each at its pose: ``name=(shape, T)``."""
-    tree = Tree()
-    root = tree.product("assembly")
-    for name, (shape, T) in parts.items():
-        tree.put(root, tree.product(name, first_solid(shape)), T)
-    return tree.write(path)
 
 
 def read_step(path):

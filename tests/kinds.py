@@ -51,10 +51,14 @@ DRAWN = [
 ]
 
 
+def mesh_shape(made, fit="off", **more):
+    """A mesh of trimesh as a shape."""
+    return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, **more)
+
+
 def faceted_shape(solid, error, fit="off"):
     """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
-    facets = mesh(solid, error)
-    return shapes.MeshShape(make_mesh(facets.vertices, facets.faces), fit, solid.name)
+    return mesh_shape(mesh(solid, error), fit, name=solid.name)
 
 
 def pose(axis, angle, place):

@@ -7,6 +7,7 @@ import pytest
 from clamp3d.bench import published
 from clamp3d.bench.reproduce import reproduce
 from clamp3d.bench.reproduce_report import reproduction_to_text
+from tests.docs.project import ROOT
 
 # The reference clamp with each arc replaced by chords; computed independently to +-0.002 mm.
 EXACT_CHORDS = {1.0: 31.5314, 5.0: 31.564, 10.0: 31.660, 20.0: 32.080, 40.0: 32.647}
@@ -39,6 +40,14 @@ def test_errors_of_table_4_are_those_that_the_paper_prints(tables):
     assert [abs(v - published.ACTUAL_DISTANCE) for v in published.IMAGE_DISTANCES] == pytest.approx(image)
     text = reproduction_to_text(tables)
     assert all(f"{error:.3f}" in text for error in (*printed.values(), *image))
+
+
+def test_the_page_has_the_tables_numbers(tables):
+    rows = {(row.solver, row.unit_angle_deg): f"{row.distance:.3f}" for row in tables.table4}
+    page = (ROOT / "docs" / "reproduction.md").read_text()
+    for unit, paper in published.CHORD_DISTANCES.items():
+        name = f"chords of {unit:g} degree{'s' * (unit > 1)}"
+        assert f"| {name} | {rows['stepped', unit]} | {paper:.3f} | {rows['exact', unit]} |" in page
 
 
 def test_the_command_matches_the_paper(tables, tmp_path, monkeypatch, main):

@@ -1,5 +1,6 @@
 """Where a clamp catches a wire, against a motion of the same law by springs and points on outlines."""
 
+import json
 import math
 import os
 from dataclasses import replace
@@ -241,3 +242,22 @@ def test_figure_shows_the_counts(placed):
     (legend,) = capture_figure(placed).legends
     shown = [text.get_text() for text in legend.get_texts()]
     assert f"seated ({placed.capture.count(Outcome.SEATED)})" in shown
+
+
+def test_sweep_writes_map_and_points(placed, tmp_path, monkeypatch, main):
+    def known(clamp, *, wire, columns, **_):
+        assert (wire, columns) == ("P7", 8)
+        return placed
+
+    monkeypatch.setattr("clamp3d.cli.sweep.placement", known)
+    picture, data = tmp_path / "map.png", tmp_path / "map.json"
+    code, out, err = main("sweep", "--wire", "P7", "--steps", "8", "--map", picture, "--json", data)
+    assert code == 0, err
+    assert "  yaw    -5.402 to +5.402 deg\n" in out
+    written = json.loads(data.read_text())
+    assert (len(written["height_mm"]), len(written["sideways_mm"])) == (2, 8)
+    assert {name for row in written["outcome"] for name in row} == {"seated", "not clamped"}
+    assert sum(written["counts"].values()) == 16
+    low, high = written["captured_mm"]
+    assert f"sideways {low:+.1f} to {high:+.1f} mm" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")

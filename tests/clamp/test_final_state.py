@@ -19,9 +19,6 @@ from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.stepped import solve_bisection, solve_stepped
 
-# Reference clamp, exact distances with each arc replaced by chords; computed independently to +-0.002 mm.
-EXACT_CHORDS = {1.0: 31.5314, 5.0: 31.564, 10.0: 31.660, 20.0: 32.080, 40.0: 32.647}
-
 
 @pytest.fixture(scope="module")
 def clamp():

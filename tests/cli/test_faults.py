@@ -27,11 +27,12 @@ def scene(tmp_path):
     return boxes(tmp_path / "scene-a.toml", {"Ø→Ω": 0, "b": 20})
 
 
-def test_help_lists_every_command_and_loads_no_numeric_library():
+def test_help_lists_every_command_and_neither_it_nor_the_kernel_loads_numeric_libraries():
     done = clamp3d()
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"reproduce" in done.stdout
-    code = "import sys, clamp3d.cli; print({'numba', 'scipy', 'trimesh', 'fcl', 'coacd', 'meshcat'} & {*sys.modules})"
+    code = "import sys, clamp3d.cli, clamp3d.kernel.distance, clamp3d.kernel.pieces, clamp3d.kernel.relation\n"
+    code += "print({'numba', 'scipy', 'trimesh', 'fcl', 'coacd', 'meshcat'} & {*sys.modules})"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout == b"set()\n"
 
 

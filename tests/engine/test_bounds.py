@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 from clamp3d import baselines, distance, shapes
 from clamp3d.engine.model import ModelCache
-from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from clamp3d.testing import assert_distance, body
-from tests.kinds import BLOCK, DRAWN, faceted_shape, poses
+from tests.kinds import BLOCK, DRAWN, faceted_shape, mesh_shape, poses
 
 SLOW = settings(
     deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[HealthCheck.too_slow]
@@ -85,6 +84,6 @@ def test_the_box_of_a_mesh_holds_the_round_surface_through_its_corners():
     """A bar of six flats, none of whose corners is where the cylinder around it reaches furthest along x."""
     bar = trimesh.creation.cylinder(radius=5.0, height=8.0, sections=6)
     bar.apply_transform(rotation((0.0, 0.0, 1.0), math.pi / 6.0))
-    low, high = ModelCache().model(shapes.MeshShape(make_mesh(bar.vertices, bar.faces), "round")).bounds
+    low, high = ModelCache().model(mesh_shape(bar, "round")).bounds
     assert low[0] <= -5.0
     assert high[0] >= 5.0

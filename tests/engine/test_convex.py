@@ -18,9 +18,9 @@ from clamp3d.geometry.pose import inverse, rotation, to_target, translation
 from clamp3d.shapes import make_mesh
 from clamp3d.testing import directions
 from tests.hulls import apart
+from tests.kinds import TURNED
 
 HERE = np.eye(4)
-TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
 
 

@@ -17,7 +17,7 @@ from clamp3d.geometry.pose import inverse
 from clamp3d.geometry.profile import Profile
 from clamp3d.kernel import Cylinder, SweptArc, rotation, signed_distance, translation
 from clamp3d.shapes import make_mesh
-from tests.kinds import faceted_shape
+from tests.kinds import faceted_shape, mesh_shape
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
 BLOCK = shapes.groove_block(GROOVE, 40.0, 20.0)
@@ -98,7 +98,7 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
     half = math.sqrt((5.0 + depth) ** 2 - 5.0**2)
     # The tip's edges fall back at 45 degrees, so the slot's edge is nearest to the tip, or to one of its edges.
     truth = math.hypot(gap, half) if half <= gap else (gap + half) / math.sqrt(2.0)
-    tip = shapes.MeshShape(make_mesh(OCTAHEDRON.vertices, OCTAHEDRON.faces), "off")
+    tip = mesh_shape(OCTAHEDRON)
     d = distance(plate, tip, translation(13.0 + gap, 0.0, 0.0))
     assert d.lower <= truth + 1e-9
     assert d.upper >= truth - 1e-9

@@ -21,9 +21,8 @@ from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import inverse, rotation, to_source, to_target, translation
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Profile
-from clamp3d.shapes import make_mesh
 from clamp3d.testing import assert_distance, body
-from tests.kinds import DRAWN, TURNED, box_mesh, faceted_shape, poses
+from tests.kinds import DRAWN, TURNED, box_mesh, faceted_shape, mesh_shape, poses
 
 QUICK = settings(deadline=None, max_examples=15, suppress_health_check=[*HealthCheck])
 FACETED = [faceted_shape(shape, 0.5) for shape in DRAWN]
@@ -163,10 +162,6 @@ def test_what_lies_within_another_stands_out_by_no_more_than_the_slack(out, slac
 
 
 BRACKET = trimesh.creation.extrude_polygon(shapely.Polygon([(0, 0), (40, 0), (40, 5), (5, 5), (5, 30), (0, 30)]), 20)
-
-
-def mesh_shape(made: trimesh.Trimesh, fit: str = "off") -> shapes.MeshShape:
-    return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit)
 
 
 @settings(max_examples=30, deadline=None)

@@ -17,7 +17,7 @@ from clamp3d.engine.verdict import Thresholds
 from clamp3d.geometry.pose import to_target
 from clamp3d.kernel import SweptArc, rotation, translation
 from clamp3d.shapes import MeshShape, make_mesh
-from tests.kinds import measured_alike
+from tests.kinds import measured_alike, mesh_shape
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
 WIRE, CUBE = shapes.cylinder(6.935, 80.0), shapes.box((10, 10, 10))
@@ -132,7 +132,7 @@ def kind(a, b, T, contact):
 @pytest.mark.parametrize("error", [0.0, 0.1])
 def test_a_part_is_contained_that_stands_out_by_no_more_than_its_threshold_and_its_errors(error):
     cube, box = trimesh.creation.box((2.0, 2.0, 2.0)), shapes.box((9.0, 9.0, 9.0))
-    small = MeshShape(make_mesh(cube.vertices, cube.faces), "off", error=error)
+    small = mesh_shape(cube, error=error)
     for out, verdict in ((0.0095, "contained"), (0.0105, "clash")):
         T = translation(3.5 + error + out, 0.0, 0.0)
         assert kind(box, small, T, 0.01) == verdict
@@ -155,7 +155,7 @@ def test_a_tetrahedron_fills_a_box(out):
     T = np.block([[T * np.linalg.det(T), np.zeros((3, 1))], [np.eye(4)[3:]]])
     points = to_target(T, made.vertices)
     T[:3, 3] = (out, 0.0, 0.0) - 0.5 * (points.min(axis=0) + points.max(axis=0))
-    part = MeshShape(make_mesh(made.vertices, made.faces), "off")
+    part = mesh_shape(made)
     assert kind(shapes.box(tuple(np.ptp(points, axis=0))), part, T, 0.01) == "contained"
 
 

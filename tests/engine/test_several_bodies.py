@@ -7,9 +7,8 @@ import pytest
 import trimesh
 
 from clamp3d import Scene, Verdict, check, shapes
-from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.pose import translation
-from clamp3d.geometry.shapes import MeshShape
+from tests.kinds import mesh_shape
 
 FIRST = np.array([[-5.0, -5.0, -5.0], [5.0, 5.0, 5.0]])
 CAVITY = np.array([[-3.0, -3.0, -3.0], [3.0, 3.0, 3.0]])
@@ -43,7 +42,7 @@ def test_bodies_of_one_mesh_are_one_part(second, hollow, turned):
         other[0, 0] = 4.0  # beside the cavity
     bodies = [box_mesh(FIRST), box_mesh(other), *([box_mesh(CAVITY, inward=True)] if hollow else [])]
     whole = trimesh.util.concatenate(bodies[::-1] if turned else bodies)
-    part = MeshShape(make_mesh(whole.vertices, whole.faces), "off")
+    part = mesh_shape(whole)
     rng = np.random.default_rng(5)
     for centre in [(-1.2, 0.0, 0.0), (4.3, 0.0, 0.3), (4.0, 0.4, 0.2), *rng.uniform(-6.0, 11.0, (12, 3))]:
         probe = np.array([-0.5, 0.5])[:, None] + centre
@@ -77,7 +76,7 @@ def loop():
         ends = np.array([LOOP[k] - HALF * (k > 0) * way[k], LOOP[k + 1] + HALF * (k < 3) * way[k]])
         wide = HALF * np.abs(aside[k])
         boxes.append(np.column_stack([[ends.min(axis=0) - wide, ends.max(axis=0) + wide], [-HALF, HALF]]))
-    return MeshShape(make_mesh(tube.vertices, tube.faces), "off"), boxes
+    return mesh_shape(tube), boxes
 
 
 def union(place, boxes):
@@ -90,7 +89,7 @@ def union(place, boxes):
 def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
     part, boxes = loop()
     cube = box_mesh([[-0.5] * 3, [0.5] * 3])
-    probe = shapes.box((1, 1, 1)) if form == "drawn" else MeshShape(make_mesh(cube.vertices, cube.faces), "off")
+    probe = shapes.box((1, 1, 1)) if form == "drawn" else mesh_shape(cube)
     rng = np.random.default_rng(3)
     drawn = rng.uniform([10, -15, -8.4], [35, 15, 8.4], (40, 3))
     for centre in [(31, 0, 0), (20, 6, 0), (20, 7, 3), (20, 0, 0), *drawn]:
@@ -113,7 +112,7 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
 def test_no_body_is_lost_that_touches_others_and_is_inside_out(way, inward):
     boxes = [np.array([[-5.0] * 3, [5.0] * 3]) + k * np.array(way) for k in range(3)]
     whole = trimesh.util.concatenate([box_mesh(box, inward=k in inward) for k, box in enumerate(boxes)])
-    part = MeshShape(make_mesh(whole.vertices, whole.faces), "off")
+    part = mesh_shape(whole)
     for box in boxes:
         probe = Scene().add("a", part).add("b", shapes.box((1, 1, 1)), translation(*box.mean(axis=0)))
         pair = check(probe).pairs[0]
@@ -124,7 +123,7 @@ def test_no_body_is_lost_that_touches_others_and_is_inside_out(way, inward):
 def test_a_plane_parts_a_small_part_from_one_that_it_lies_deep_in():
     """The way out, 5.5 mm over the top, is longer than the lengths that are tried one after the other."""
     whole = trimesh.util.concatenate([box_mesh(FIRST), box_mesh(SECOND["touching"])])
-    part = MeshShape(make_mesh(whole.vertices, whole.faces), "off")
+    part = mesh_shape(whole)
     distance = check(Scene().add("a", part).add("b", shapes.box((1, 1, 1)))).pairs[0].distance
     assert -distance.lower == pytest.approx(5.5, abs=1e-6)
     moved = np.array([-0.5, 0.5])[:, None] - distance.lower * distance.normal

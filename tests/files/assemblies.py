@@ -18,10 +18,9 @@ from OCP.TopLoc import TopLoc_Location
 from clamp3d.files.cad import Key, matrix
 from clamp3d.files.open_cascade import explore
 from clamp3d.files.solid import BrepSolid, require_open_cascade
-from tests.cad import Tree, ball, cone, cut, location, moved, ring, rod, shift, volume
+from tests.cad import Tree, ball, bounds, cone, cut, location, moved, ring, rod, shift, volume
 from tests.cad import block as box
 from tests.cad import first_solid as solid_of
-from tests.output.step_reader import bounds
 
 
 def fuse(shape, *others):

@@ -1,10 +1,5 @@
 """STEP files as Open CASCADE's own reader finds them, for files that clamp3d wrote."""
 
-import numpy as np
-from OCP.Bnd import Bnd_Box
-from OCP.BRepBndLib import BRepBndLib
-from OCP.BRepGProp import BRepGProp
-from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -15,7 +10,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from tests.cad import matrix
+from tests.cad import matrix, volume
 
 
 class Leaf:
@@ -28,7 +23,7 @@ class Leaf:
     def __init__(self, name, path, label, place, colour):
         self.name, self.path, self.colour = name, path, colour or colour_of(label)
         shape = XCAFDoc_ShapeTool.GetShape_s(label)
-        self.shape, self.solid, self.volume = shape.Moved(place), shape.TShape(), volume(shape)
+        self.shape, self.solid, self.volume = shape.Moved(place), shape.TShape(), volume(shape, 1e-9)
         self.T = matrix(place)[:3]
         self.face_colours = sorted(filter(None, map(colour_of, children(label))))
 
@@ -74,17 +69,3 @@ def colour_of(label):
     if XCAFDoc_ColorTool.GetColor_s(label, XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour):
         return Quantity_Color.ColorToHex_s(colour).ToCString()
     return None
-
-
-def volume(shape):
-    """To 1e-9 of it, where tests.cad takes the default."""
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties, 1e-9)
-    return properties.Mass()
-
-
-def bounds(shape):
-    """Tight box (2, 3) of a shape, arcs taken as arcs."""
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    return np.array([point.Coord() for point in (box.CornerMin(), box.CornerMax())])

@@ -19,7 +19,8 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from OCP.BRep import BRep_Tool
 
 from clamp3d.files.open_cascade import explore
-from tests.output.step_reader import bounds, read_step
+from tests.cad import bounds
+from tests.output.step_reader import read_step
 
 
 @pytest.mark.parametrize(

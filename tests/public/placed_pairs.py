@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from OCP.Bnd import Bnd_Box
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeEdge,
@@ -31,6 +29,7 @@ from tests.cad import (
     Tree,
     ball,
     block,
+    bounds,
     cone,
     cut,
     first_solid,
@@ -91,13 +90,6 @@ def bulge(radius, half_length):
     poles = gp_Pnt(0, 0, -half_length), gp_Pnt(2 * radius, 0, 0), gp_Pnt(0, 0, half_length)
     axis = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
     return BRepPrimAPI_MakeRevol(face_under(poles), axis).Shape()
-
-
-def bottom_of(shape):
-    """The lowest z of a shape, mm."""
-    bounds = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, bounds, False, False)
-    return bounds.CornerMin().Z()
 
 
 def drilled(rng, low, high, radius):
@@ -291,7 +283,7 @@ def fastener(kind):
 
 def nut_on_plate(rng, gap):
     nut, size = fastener("nut"), rng.uniform(12, 20)
-    return block((-size, -size, -6), (size, size, 0)), moved(nut, shift(0, 0, gap - bottom_of(nut)))
+    return block((-size, -size, -6), (size, size, 0)), moved(nut, shift(0, 0, gap - bounds(nut)[0, 2]))
 
 
 def screw_in_plate(rng, gap):

@@ -10,6 +10,7 @@ import trimesh
 from clamp3d import Scene, check, distance, load
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import MeshShape, box, cylinder, make_mesh
+from tests.kinds import mesh_shape
 
 SKEW = rotation((1.0, 2.0, 3.0), 0.7)
 MADE = {
@@ -18,10 +19,6 @@ MADE = {
     "box": trimesh.creation.box((12.0, 10.0, 8.0)),
     "torus": trimesh.creation.torus(10.0, 3.0, 48, 24),
 }
-
-
-def as_shape(mesh):
-    return MeshShape(make_mesh(mesh.vertices, mesh.faces), "off")
 
 
 def manifold(mesh, T=None):
@@ -43,14 +40,14 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
     for reach in (9.0, 14.0, 22.0):
         T = placed(rng, reach)
         one, two = manifold(MADE[a]), manifold(MADE[b], T)
-        scene = Scene(clearance=30.0).add("a", as_shape(MADE[a])).add("b", as_shape(MADE[b]), T)
+        scene = Scene(clearance=30.0).add("a", mesh_shape(MADE[a])).add("b", mesh_shape(MADE[b]), T)
         volume, row = (one ^ two).volume(), check(scene).pairs[0]
         if volume > 0.1:
             assert row.verdict.value in ("clash", "contained")
             low, high = row.where.volume
             assert low * 0.999 - 1e-6 <= volume <= high * 1.001 + 1e-6
         elif volume == 0.0:
-            measured = distance(as_shape(MADE[a]), as_shape(MADE[b]), T)
+            measured = distance(mesh_shape(MADE[a]), mesh_shape(MADE[b]), T)
             gap = one.min_gap(two, 60.0)
             assert measured.lower - 1e-6 <= gap <= measured.upper + 1e-6
             assert measured.upper - measured.lower < 1e-4
@@ -59,7 +56,7 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
 @pytest.mark.parametrize("name", MADE)
 @pytest.mark.parametrize("offset", [0.0, 0.005])
 def test_one_mesh_twice_is_an_overlap(name, offset):
-    shape = as_shape(MADE[name])
+    shape = mesh_shape(MADE[name])
     scene = Scene().add("a", shape, SKEW).add("b", shape, translation(offset, 0, 0) @ SKEW)
     assert check(scene).verdict("a", "b").value in ("duplicate", "contained", "clash")
 
@@ -68,7 +65,7 @@ def opened(mesh):
     return MeshShape(make_mesh(mesh.vertices, np.delete(mesh.faces, 0, axis=0)), "off")
 
 
-@pytest.mark.parametrize("other", [box((4, 4, 4)), as_shape(trimesh.creation.box((4, 4, 4))), cylinder(2, 4)])
+@pytest.mark.parametrize("other", [box((4, 4, 4)), mesh_shape(trimesh.creation.box((4, 4, 4))), cylinder(2, 4)])
 def test_of_an_open_mesh_distances_are_certain_and_its_inside_is_not_known(other):
     scene = Scene(clearance=2.0).add("open", opened(trimesh.creation.box((10, 10, 10))))
     row = check(scene.add("b", other, translation(8, 0.5, 0.3)), distances=True).pairs[0]

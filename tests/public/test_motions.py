@@ -8,8 +8,8 @@ import trimesh
 
 from clamp3d import Motion, Scene, check, first_contact, load, min_clearance
 from clamp3d.kernel import translation
-from clamp3d.shapes import MeshShape, SweptArc, box, cylinder, groove_block, make_mesh
-from tests.kinds import DRAWN, faceted_shape, pose
+from clamp3d.shapes import SweptArc, box, cylinder, groove_block
+from tests.kinds import DRAWN, faceted_shape, mesh_shape, pose
 
 ACCURACY = 3e-4
 """How far apart bodies may still be at a first contact, mm."""
@@ -19,8 +19,7 @@ TUBE, PIN = cylinder(9.0, 40.0, bore=5.1), cylinder(5.0, 60.0)
 
 
 def mesh_box(*size):
-    mesh = trimesh.creation.box(size)
-    return MeshShape(make_mesh(mesh.vertices, mesh.faces), "off")
+    return mesh_shape(trimesh.creation.box(size))
 
 
 def down(way):
@@ -97,11 +96,12 @@ def test_verdicts_of_a_motion_in_a_scene(way, expected):
 @pytest.fixture(scope="module")
 def plate_and_pin(tmp_path_factory):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from tests.cad import block, cut, rod, write_parts
+    from tests.cad import block, cut, location, rod
+    from tests.files.assemblies import write_step
 
     path = tmp_path_factory.mktemp("cad") / "pin.step"
     plate = cut(block((-15, -15, -3), (15, 15, 3)), rod(4.1, -4, 4))
-    write_parts(path, plate=(plate, np.eye(4)), pin=(rod(4.0, 0, 20), translation(0, 0, 10)))
+    write_step({"plate": plate, "pin": rod(4.0, 0, 20).Located(location(translation(0, 0, 10)))}, path)
     return {part.name: part for part in load(path).parts}
 
 
@@ -117,10 +117,11 @@ def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
 def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
     """What stands out of the facets counts: the lowest line of the cylinder starts 0.05 mm above the plate."""
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from tests.cad import block, rod, write_parts
+    from tests.cad import block, rod
+    from tests.files.assemblies import write_step
 
     plate, bar = block((-40, -40, -3), (40, 40, 0)), rod(8.0, -6, 6)
-    path = write_parts(tmp_path / "over.step", plate=(plate, np.eye(4)), bar=(bar, np.eye(4)))
+    path = write_step({"plate": plate, "bar": bar}, tmp_path / "over.step")
     parts = {part.name: part for part in load(path).parts}
     start = pose((1.0, 0.0, 0.0), math.pi / 2, (-10.0, 0.0, 8.05))
     least = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)

@@ -41,6 +41,7 @@ def _one(start, vector, *, R=7.0, half=_HALF, L=50.0, r=6.935, length=200.0, **m
 
 @pytest.mark.parametrize("gap", [0.0, 1e-3, -1e-3])
 def test_known_answers_of_a_double_root(gap):
+    """Those of the program: tests/geometry/test_motion.py."""
     # On a line at 45 degrees the wire's centre passes the lip at r + gap.
     half = math.radians(60.0)
     s, h = 7.0 * math.sin(half), -7.0 * math.cos(half)
@@ -48,9 +49,6 @@ def test_known_answers_of_a_double_root(gap):
     start = np.array([s, h]) + (2.0 + gap) * up - 2.0 * along
     cases = _one((*start, 0.0), (*(8.0 * along), 0.0), half=half, r=2.0)
     assert least_distance(cases, 0)[0] == pytest.approx(gap, abs=1e-12)
-    groove, wire, motion = cases.shapes.groove(0), cases.shapes.cylinder(0), cases.motion(0)
-    assert clamp3d.first_contact(groove, wire, motion, cases.start[0]).touches == (gap <= 0.0)
-    assert clamp3d.min_clearance(groove, wire, motion, cases.start[0]).distance.value == pytest.approx(gap, abs=1e-6)
 
 
 def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
