@@ -147,6 +147,6 @@ def test_a_first_contact_is_not_told_later_than_it_is():
     assert result.motions[0].contact_at == pytest.approx(0.12347, abs=2e-5)
     assert "first contact at t = 0.1234," in circumstances(result.motions[0])
     told = check_to_text(result)
-    assert re.search(r"  b and a clash: overlap at least \d+(\.\d+)? mm; .*first contact at t = 0\.1234,", told)  # at another time it may be deeper
+    assert re.search(r"  b and a clash: overlap at least \d+(\.\d+)? mm; .*first contact at t = 0\.1234,", told)
     row = next(line for line in told.splitlines() if line.startswith("  translation"))
     assert " 0.1234 " in row
