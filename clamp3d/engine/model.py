@@ -49,9 +49,6 @@ Of two equal cylinders, one in the other, facets overlap by a chord error, and a
 fine ones are less than the usual threshold of contact, 0.01 mm.
 """
 
-LAST_CHORDS = (CAD_CHORDS[-1], 0.0006)
-"""Chord errors (mm) of meshes, however large, for pairs of which Open CASCADE does not find the common part."""
-
 Forms = tuple[ClosedForm, ...]
 """Bodies in closed form whose union is a shape."""
 

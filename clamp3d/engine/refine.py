@@ -16,7 +16,7 @@ from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
 from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
-from clamp3d.engine.model import LAST_CHORDS, Forms, Model
+from clamp3d.engine.model import CAD_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import Clamp3dError, SolverError
 from clamp3d.files.pairs import TOLERANCE
@@ -106,9 +106,8 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         yield "exact", overlap
         if np.isinf(overlap.lower):  # finer ones take longer
             break
-    for chord in LAST_CHORDS:  # Open CASCADE did not find the common part
-        if chord not in chords:
-            yield "meshes", _by_fine_meshes(a, b, T, chord, enough, thorough=True)
+    if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
+        yield "meshes", _by_fine_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
 
 
 def _by_fine_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:

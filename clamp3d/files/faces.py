@@ -25,7 +25,7 @@ _SIZES: dict[str, tuple[str, ...]] = {
 """Open CASCADE's names of `Surfaces.size`."""
 
 _ALIKE = 1e-7
-"""How far (mm) a spline may be from a plane, cylinder, cone or sphere to count as one: Open CASCADE's confusion."""
+"""How far (mm) a spline may be from a plane, cylinder, cone, ... to count as one: Open CASCADE's confusion."""
 _STEP = 1e-4
 """Step (mm) off a surface to see on which side its normal is."""
 
@@ -84,14 +84,18 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
 def _canonical(face: Any) -> tuple[str, Any]:
     """Kind of a face and its surface (gp_Pln, gp_Cylinder, ...), also where a file gives it as a spline."""
     surface = occ.BRepAdaptor_Surface(face)
-    name = surface.GetType().name.removeprefix("GeomAbs_").lower()
-    if name in _SIZES:
-        return name, getattr(surface, name.capitalize())()
-    for kind, form in (("plane", "Pln"), ("cylinder", "Cylinder"), ("cone", "Cone"), ("sphere", "Sphere")):
-        result = getattr(occ, f"gp_{form}")()
-        if getattr(occ.ShapeAnalysis_CanonicalRecognition(face), f"Is{kind.capitalize()}")(_ALIKE, result):
-            return kind, result
-    return "other", None
+    if (name := _kind(surface)) == "other":
+        plain = occ.GeomConvert_SurfToAnaSurf(occ.BRep_Tool.Surface_s(face)).ConvertToAnalytical(_ALIKE)
+        if plain is not None:
+            surface = occ.GeomAdaptor_Surface(plain)
+            name = _kind(surface)
+    return name, None if name == "other" else getattr(surface, name.capitalize())()
+
+
+def _kind(surface: Any) -> str:
+    """The kind of a GeomAdaptor_Surface or BRepAdaptor_Surface, of `KINDS`."""
+    name: str = surface.GetType().name.removeprefix("GeomAbs_").lower()
+    return name if name in _SIZES else "other"
 
 
 def _sense(face: Any, kind: int, frame: Array, size: Array) -> float:

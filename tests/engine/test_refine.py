@@ -87,13 +87,13 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    last, finest = "0.0018 ['thorough']", "0.0006 ['thorough']"
+    last = ["0.0018 ['thorough']"]
     both = (0.1, 0.0018)
     for first, second, triangles, quick, fine, end in (
-        (both, (0.1,), math.inf, ["0.1 []"], [], [last, finest]),
-        (both, both, 15_000, ["0.1 []", "0.0018 []"], [], [finest]),
-        (both, both, 15_001, ["0.1 []"], ["0.0018 []"], [finest]),
-        ((), (), math.inf, [], [], [last, finest]),
+        (both, (0.1,), math.inf, ["0.1 []"], [], last),
+        (both, both, 15_000, ["0.1 []", "0.0018 []"], [], []),
+        (both, both, 15_001, ["0.1 []"], ["0.0018 []"], []),
+        ((), (), math.inf, [], [], last),
     ):
         a, b = (
             SimpleNamespace(exact=1, is_simple=True, chords=chords, quick_bodies=(1,), fine_triangles=triangles)
@@ -117,7 +117,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     a = SimpleNamespace(exact=1, is_simple=True, chords=(), quick_bodies=None, fine_triangles=math.inf)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
-    assert len(answers) == 6
+    assert len(answers) == 5
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[4:])
 
 
