@@ -101,7 +101,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         from clamp3d.engine.exact import exact_overlap
 
         # A pin's way out of a hole says nothing of how much it is too thick.
-        by_points = exact_overlap(a, b, T, SHARES[1] if fine else SHARES[0])
+        by_points = exact_overlap(a, b, T, SHARES[1])
         depth, interference = max(depth, -by_points.upper), (depth, min(interference[1], -by_points.lower))
         upper = min(upper, -depth)
         method = by_points.method if np.isfinite(by_points.lower) else method

@@ -107,9 +107,9 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
     corner, and the distance from the whole surface is no larger than that from any one of its triangles. Another is
     that of `_moves_out`. Infinite where one body may be swallowed whole, since the surfaces then say nothing of its
-    middle.
+    middle, and of a common part with more triangles than it may be cut into.
     """
-    if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
+    if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)) or len(shared.faces) > cuts:
         return np.inf
     bound = np.inf
     for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):

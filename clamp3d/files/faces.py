@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,8 @@ _SIZES: dict[str, tuple[str, ...]] = {
 
 _ALIKE = 1e-7
 """How far (mm) a spline may be from a plane, cylinder, cone, ... to count as one: Open CASCADE's confusion."""
+_MOST_PLACES = 20_000
+"""Points of a spline that are looked at to see that it is a plain surface, at most: some 50 ms."""
 _STEP = 1e-4
 """Step (mm) off a surface to see on which side its normal is."""
 
@@ -59,20 +62,11 @@ def surfaces(brep: bytes) -> Surfaces:
 
 def surfaces_of(faces: list[Any]) -> Surfaces:
     """The same of a list of TopoDS_Face."""
-    kinds, frames, sizes, senses = [], [], [], []
+    rows = []
     for face in faces:
-        name, form = _canonical(face)
-        kind, frame, size, sense = KINDS.index(name), np.vstack([np.zeros(3), np.eye(3)]), np.zeros(2), 1.0
-        if kind != OTHER:
-            place = form.Position()
-            axes = (place.XDirection(), place.YDirection(), place.Direction())
-            frame = np.array([place.Location().Coord(), *(axis.Coord() for axis in axes)])
-            size[: len(_SIZES[name])] = [getattr(form, of)() for of in _SIZES[name]]
-            sense = _sense(face, kind, frame, size)
-        kinds.append(kind)
-        frames.append(frame)
-        sizes.append(size)
-        senses.append(sense)
+        kind, frame, size = _canonical(face)
+        rows.append((kind, frame, size, 1.0 if kind == OTHER else _sense(face, kind, frame, size)))
+    kinds, frames, sizes, senses = zip(*rows, strict=True) if rows else ((), (), (), ())
     return Surfaces(
         np.array(kinds, dtype=np.int64),
         np.array(frames).reshape(-1, 4, 3),
@@ -81,21 +75,50 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
     )
 
 
-def _canonical(face: Any) -> tuple[str, Any]:
-    """Kind of a face and its surface (gp_Pln, gp_Cylinder, ...), also where a file gives it as a spline."""
-    surface = occ.BRepAdaptor_Surface(face)
-    if (name := _kind(surface)) == "other":
-        plain = occ.GeomConvert_SurfToAnaSurf(occ.BRep_Tool.Surface_s(face)).ConvertToAnalytical(_ALIKE)
+def _canonical(face: Any) -> tuple[int, Array, Array]:
+    """Kind, frame (4, 3) and sizes (2,) of a face's surface, also where a file gives it as a spline."""
+    kind, frame, size = _form(occ.BRepAdaptor_Surface(face))
+    spline = occ.BRep_Tool.Surface_s(face)
+    if kind == OTHER and isinstance(spline, occ.Geom_BSplineSurface):
+        plain = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(_ALIKE)
         if plain is not None:
-            surface = occ.GeomAdaptor_Surface(plain)
-            name = _kind(surface)
-    return name, None if name == "other" else getattr(surface, name.capitalize())()
+            form = _form(occ.GeomAdaptor_Surface(plain))
+            if _coincides(spline, *form):
+                return form
+    return kind, frame, size
 
 
-def _kind(surface: Any) -> str:
-    """The kind of a GeomAdaptor_Surface or BRepAdaptor_Surface, of `KINDS`."""
-    name: str = surface.GetType().name.removeprefix("GeomAbs_").lower()
-    return name if name in _SIZES else "other"
+def _form(surface: Any) -> tuple[int, Array, Array]:
+    """Kind, frame (4, 3) and sizes (2,) of a BRepAdaptor_Surface or GeomAdaptor_Surface."""
+    name, size = surface.GetType().name.removeprefix("GeomAbs_").lower(), np.zeros(2)
+    if name not in _SIZES:
+        return OTHER, np.vstack([np.zeros(3), np.eye(3)]), size
+    form = getattr(surface, name.capitalize())()
+    place = form.Position()
+    axes = (place.XDirection(), place.YDirection(), place.Direction())
+    size[: len(_SIZES[name])] = [getattr(form, of)() for of in _SIZES[name]]
+    return KINDS.index(name), np.array([place.Location().Coord(), *(axis.Coord() for axis in axes)]), size
+
+
+def _coincides(spline: Any, kind: int, frame: Array, size: Array) -> bool:
+    """Whether a spline is a plane, quadric or torus: Open CASCADE looks at some points, and may miss a bump.
+
+    Lemma: between two knots a spline of degree p, put into the equation of a surface of degree 4, gives a polynomial of
+    degree 4 p over a denominator. If it is zero at 4 p + 1 places in each direction, it is zero. A spline with so many
+    knots that this takes too long is nothing that somebody drew as a plain surface.
+    """
+    u = _places([spline.UKnot(i) for i in range(1, spline.NbUKnots() + 1)], 4 * spline.UDegree() + 1)
+    v = _places([spline.VKnot(i) for i in range(1, spline.NbVKnots() + 1)], 4 * spline.VDegree() + 1)
+    if kind == OTHER or len(u) * len(v) > _MOST_PLACES:
+        return False
+    points = np.array([spline.Value(x, y).Coord() for x in u for y in v])
+    return bool(np.abs(height(kind, frame, size, points)).max() <= _ALIKE)
+
+
+def _places(knots: list[float], each: int) -> list[float]:
+    """As many parameters between each two knots."""
+    shares = (np.arange(each) + 0.5) / each
+    return [a + share * (b - a) for a, b in itertools.pairwise(knots) for share in shares.tolist()]
 
 
 def _sense(face: Any, kind: int, frame: Array, size: Array) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -30,6 +31,14 @@ _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
+
+
+class Side(Enum):
+    """On which side of a solid's surface a point lies."""
+
+    INSIDE = auto()
+    OUTSIDE = auto()
+    UNKNOWN = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,10 +88,10 @@ def distance(a: bytes, b: bytes, T: Array) -> Nearest:
     0.05 mm apart): a ball is as near as its centre, less its radius. Raises Clamp3dError if it finds no distance.
     """
     first, second = from_bytes(a), moved(from_bytes(b), T)
-    if (ball := _ball(a)) is not None:
-        return _from_ball(*ball, second)
-    if (ball := _ball(b)) is not None:
-        return _from_ball(to_target(T, ball[0]), ball[1], first).swapped()
+    if (ball := _ball(a)) is not None and (nearest := _from_ball(*ball, second)) is not None:
+        return nearest
+    if (ball := _ball(b)) is not None and (nearest := _from_ball(to_target(T, ball[0]), ball[1], first)) is not None:
+        return nearest.swapped()
     nearest = _nearest(first, second)
     if nearest.distance <= TOLERANCE:
         return nearest
@@ -102,17 +111,17 @@ def _ball(brep: bytes) -> tuple[Array, float] | None:
     return (centre, radius) if is_whole else None
 
 
-def _from_ball(centre: Array, radius: float, solid: Any) -> Nearest:
-    """The nearest points of a ball and a solid.
+def _from_ball(centre: Array, radius: float, solid: Any) -> Nearest | None:
+    """The nearest points of a ball and a solid; None where the centre is not certainly outside.
 
     Lemma: where the centre is outside, at a distance d from the solid, no point of one is deeper in the other than r -
     d. A point of the solid in the ball is at least d from the centre; one of the ball is at most r - d from the ball of
     radius d about the centre, which nothing of the solid is in.
     """
-    depth, foot = _signed_depth(solid, occ.BRepClass3d_SolidClassifier(solid), centre)
-    if depth >= -TOLERANCE:
-        return Nearest(0.0, foot, foot)
-    return Nearest(-depth - radius, centre - radius / depth * (foot - centre), foot, is_signed=True)
+    side, away, foot = _side_and_distance(solid, occ.BRepClass3d_SolidClassifier(solid), centre)
+    if side is not Side.OUTSIDE or away <= TOLERANCE:
+        return None
+    return Nearest(away - radius, centre + radius / away * (foot - centre), foot, is_signed=True)
 
 
 def _nearest(a: Any, b: Any) -> Nearest:
@@ -205,20 +214,25 @@ def depths(brep: bytes, points: Array) -> Array:
     """Signed depth (k,) mm of points (k, 3) in a solid: negative outside, or where nobody knows the side."""
     shape = from_bytes(brep)
     classifier = occ.BRepClass3d_SolidClassifier(shape)
-    return np.array([_signed_depth(shape, classifier, point)[0] for point in points])
+    every = [_side_and_distance(shape, classifier, point) for point in points]
+    return np.array([away if side is Side.INSIDE else -away for side, away, _ in every])
 
 
-def _signed_depth(solid: Any, classifier: Any, point: Array) -> tuple[float, Array]:
-    """The depth (mm) of a point (3,) in a solid, and the point (3,) of its surface that is nearest."""
+def _side_and_distance(solid: Any, classifier: Any, point: Array) -> tuple[Side, float, Array]:
+    """Where a point (3,) lies, its distance (mm) from a solid's surface, and the point (3,) there that is nearest.
+
+    Near splines Open CASCADE errs. What is beyond the nearest point is on the other side: if it says the same of both,
+    nobody knows.
+    """
 
     def is_outside(point: Array) -> bool:
         classifier.Perform(occ.gp_Pnt(*point.tolist()), TOLERANCE)
         return bool(classifier.State() == occ.TopAbs_State.TopAbs_OUT)
 
     away, foot = _from_surface(solid, point)
-    # Near splines Open CASCADE errs. Beyond the foot is the other side: if it says the same of both, none counts.
     beyond = foot + min(1.0, _BEYOND / max(away, TOLERANCE)) * (foot - point)
-    return (-away if is_outside(point) or not is_outside(beyond) else away), foot
+    side = Side.OUTSIDE if is_outside(point) else Side.INSIDE
+    return (Side.UNKNOWN if is_outside(beyond) is (side is Side.OUTSIDE) else side), away, foot
 
 
 def _from_surface(solid: Any, point: Array) -> tuple[float, Array]:

@@ -19,9 +19,10 @@ ANGLE = 0.35
 SAMPLED = 2.0
 """Factor on the deviation measured at the edges' middles of splines; 4/3 is enough where the surface is quadratic."""
 
-_FACTORS = np.array([1.0, 1.0, 1.4, 1.4, 1.4, SAMPLED])
-"""The same by kind of surface. On a cylinder, as on a circle, nothing is further than such a middle; on cones, spheres
-and tori, of which a facet is a small part, it is next to quadratic.
+_FACTORS = np.array([1.0, 1.0, 2.0, 1.4, 1.4, SAMPLED])
+"""The same by kind of surface. On a cylinder, as on a circle, nothing is further than such a middle; on spheres and
+tori, of which a facet is a small part, it is next to quadratic. Along the edge of a cone from a circle to another one
+of k times its radius it is 2 (1 + k) / (1 + sqrt k)^2 times as far.
 """
 
 

@@ -15,7 +15,7 @@ from clamp3d.engine.verdict import Thresholds
 from clamp3d.files import cad_process, pairs
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
-from tests.cad import ball, block, moved
+from tests.cad import ball, block, cut, first_solid, moved, shift
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -140,6 +140,15 @@ def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
             model_of(BrepSolid.of(solid, "a"), Counters()) for solid in (ball(2.0, z), block((-9, -9, -9), (9, 9, 0)))
         )
         assert exact_distance(a, b, np.eye(4)).lower == exact_distance(b, a, np.eye(4)).lower == -np.inf
+
+
+@pytest.mark.parametrize("width", [0.03, 0.04])
+def test_a_ball_in_material_beside_a_narrow_slot_is_no_ball_outside(width):
+    """Just beyond the nearest wall, on the other side of the slot, is material too."""
+    slotted = cut(block((-9, -9, -9), (9, 9, 9)), block((3, -9, -9), (3 + width, 9, 5)))
+    for radius, x in ((1.0, 0.0), (0.5, 2.4), (2.0, 2.0)):
+        a, b = (BrepSolid.of(solid, "a").brep for solid in (moved(ball(radius), shift(x)), first_solid(slotted)))
+        assert pairs.distance(a, b, np.eye(4)).distance == pairs.distance(b, a, np.eye(4)).distance == 0.0
 
 
 @pytest.mark.parametrize("splines", [0.0, 1.0])

@@ -54,6 +54,21 @@ def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines
         assert (form.sense[k] * rises > 1e-3).all()
 
 
+def test_a_bump_between_the_places_that_open_cascade_looks_at_is_found(monkeypatch):
+    solid = first_solid(as_splines(ball(5)))
+    spline = faces.occ.BRep_Tool.Surface_s(next(explore(solid, "FACE")))
+    data = SPHERE, np.vstack([np.zeros(3), np.eye(3)]), np.array([5.0, 0.0])
+    for a, b in ((0.0, np.pi / 3), (np.pi / 3, 2 * np.pi / 3)):
+        for share in (0.25, 0.5, 0.75):
+            spline.InsertUKnot(a + share * (b - a), 1, 0.0)
+    assert faces._coincides(spline, *data)
+    with monkeypatch.context() as patch:
+        patch.setattr(faces, "_MOST_PLACES", 100)
+        assert not faces._coincides(spline, *data)
+    spline.SetPole(4, 2, spline.Pole(4, 2).Translated(faces.occ.gp_Vec(0, 0, 1e-5)))
+    assert not faces._coincides(spline, *data)
+
+
 def test_what_is_only_nearly_a_sphere_is_none():
     round_, egg = (first_solid(as_splines(ball(5))) for _ in range(2))
     for solid, bump in ((round_, 0.0), (egg, 1e-5)):
