@@ -19,9 +19,8 @@ from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.engine.surface import Surface, at_edges
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import CYLINDER, PLANE
+from clamp3d.files.faces import CONE, CYLINDER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
-from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array
@@ -224,12 +223,23 @@ class CadModel(Model):
             return ()
         if not is_closed(coarse.faces):
             return ()
-        return CAD_CHORDS if _fine_triangles(coarse) <= _MOST_FINE else CAD_CHORDS[:1]
+        return CAD_CHORDS if self._fine_triangles <= _MOST_FINE else CAD_CHORDS[:1]
 
     @cached_property
     def fine_triangles(self) -> float:
-        """About how many triangles its finest mesh has, or more; infinite if it has none."""
-        return _fine_triangles(self.shape.tessellated(CAD_CHORDS[0])) if len(self.chords) > 1 else np.inf
+        """About how many triangles its fine mesh has; infinite if it has none."""
+        return self._fine_triangles if len(self.chords) > 1 else np.inf
+
+    @cached_property
+    def _fine_triangles(self) -> float:
+        """Triangles of a fine mesh, from the errors of a coarse one.
+
+        On planes, cylinders and cones the error of a triangle is as its width squared, elsewhere as its area.
+        """
+        coarse = self.shape.tessellated(CAD_CHORDS[0])
+        finer = np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0)
+        one_way = self.shape.surfaces.kind[coarse.face] <= CONE
+        return float(np.where(one_way, np.sqrt(finer), finer).sum())
 
     @cached_property
     def bodies(self) -> Forms | None:
@@ -253,11 +263,6 @@ class CadModel(Model):
     def _surface(self, chord: float, inside: bool) -> Surface:
         mesh = self.shape.tessellated(chord)
         return Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors))
-
-
-def _fine_triangles(coarse: Tessellation) -> float:
-    """Triangles of a fine mesh of a solid at most: on a face that bends both ways their error is as their area."""
-    return float(np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0).sum())
 
 
 class MeshModel(Model):

@@ -28,7 +28,7 @@ ACCURACY = 1e-7
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
 
-_QUICKLY = 30_000
+_QUICKLY = 15_000
 """Triangles of two fine meshes up to which they are made before Open CASCADE is asked, which takes as long then."""
 
 Enough = Callable[[Distance], bool]

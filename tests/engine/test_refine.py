@@ -91,8 +91,8 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
     both = (0.1, 0.0018)
     for first, second, triangles, quick, fine, end in (
         (both, (0.1,), math.inf, ["0.1 []"], [], last),
-        (both, both, 15_000, ["0.1 []", "0.0018 []"], [], []),
-        (both, both, 15_001, ["0.1 []"], ["0.0018 []"], []),
+        (both, both, 7_500, ["0.1 []", "0.0018 []"], [], []),
+        (both, both, 7_501, ["0.1 []"], ["0.0018 []"], []),
         ((), (), math.inf, [], [], last),
     ):
         a, b = (
