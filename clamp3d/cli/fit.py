@@ -14,14 +14,14 @@ from clamp3d.output.fit_report import fit_to_html, fit_to_text
 
 @command("fit")
 class Fit(Quiet):
-    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, GLB, 3MF, STEP) each with its error bound.
+    """Find round grooves, cylinders and holes in MESH (STL, OBJ, PLY, OFF, GLB, 3MF, STEP) each with its error bound.
 
     A mesh without any is no error: exit code 0.
     """
 
     mesh: Path = argument(metavar="MESH", type=click.Path(path_type=Path))
     unit: str | None = option(
-        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY]", type=click.Choice(UNITS)
+        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY, OFF]", type=click.Choice(UNITS)
     )
     json_file: Path | None = JSON
     html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html")

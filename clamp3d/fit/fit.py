@@ -93,7 +93,8 @@ def fit_file(
     Parameters
     ----------
     path : str or Path
-        STL, OBJ, PLY, GLB, GLTF, 3MF or STEP file; see `load_mesh`. Of STEP the cylindrical faces are the features.
+        STL, OBJ, PLY, OFF, GLB, GLTF, 3MF or STEP file; see `load_mesh`. Of STEP the features are its cylindrical
+        faces.
     unit : str, optional
         Unit of the file's lengths: mm, cm, m or in.
     progress : callable, optional

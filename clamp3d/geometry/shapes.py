@@ -30,7 +30,7 @@ FITS: tuple[Fit, ...] = ("round", "off")
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """Union of ``bodies`` (they touch at most) less ``holes`` (each right through); part frame, mm.
+    """Union of ``bodies`` (they touch at most) less ``holes`` (each right through, of any outline); part frame, mm.
 
     Equal outlines are equal solids, whatever they are called. ``title`` says in words what it is, ``volume`` is its
     volume in mm^3 where a closed form is known, ``not_modelled`` what the real part has and this one has not.

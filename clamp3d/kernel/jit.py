@@ -70,7 +70,7 @@ def entry(signature: Any) -> Callable[[_F], _F]:
 class _Notice(event.Listener):
     """One line on stderr when numba begins to compile the first kernel."""
 
-    when = ", once for this machine"
+    when = ", once for this version"
     is_said = False
 
     def on_start(self, event: object) -> None:

@@ -54,7 +54,7 @@ CALL = "from clamp3d.kernel.play import plays; print(plays(12.0, 10.5))"
 def test_a_kernel_is_compiled_once_and_says_so(copied):
     cache = str(copied / "cache")
     out, said = run(CALL, copied, NUMBA_CACHE_DIR=cache)
-    assert (out, said.count("compiling the contact kernel, once for this machine")) == (["1.5"], 1)
+    assert (out, said.count("compiling the contact kernel, once for this version")) == (["1.5"], 1)
     assert run(CALL, copied, NUMBA_CACHE_DIR=cache) == (["1.5"], "")
     # A formula of another file than the kernel's own.
     (copied / "clamp3d" / "kernel" / "game.py").write_text(GAME.replace("R - r", "R + r"))
