@@ -7,12 +7,19 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
+from OCP.BRep import BRep_Builder
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeSolid
+from OCP.gp import gp_Ax3, gp_Sphere
+from OCP.TopoDS import TopoDS_Shell
+
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.files import cad_process, pairs
+from clamp3d.files.open_cascade import to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from tests.cad import ball, block, cut, first_solid, moved, shift
@@ -140,6 +147,26 @@ def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
             model_of(BrepSolid.of(solid, "a"), Counters()) for solid in (ball(2.0, z), block((-9, -9, -9), (9, 9, 0)))
         )
         assert exact_distance(a, b, np.eye(4)).lower == exact_distance(b, a, np.eye(4)).lower == -np.inf
+
+
+def test_only_a_whole_ball_counts_as_one():
+    both = BRepAlgoAPI_Fuse(ball(5.0), ball(5.0, 4.0)).Shape()
+    half = BRepBuilderAPI_MakeFace(gp_Sphere(gp_Ax3(), 5.0), 0.0, np.pi, -np.pi / 2, np.pi / 2).Face()
+    builder, open_shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(open_shell)
+    builder.Add(open_shell, half)
+    for solid in (first_solid(both), BRepBuilderAPI_MakeSolid(open_shell).Solid(), block((0, 0, 0), (1, 1, 1))):
+        assert pairs._ball(to_bytes(solid)) is None
+    assert pairs._ball(to_bytes(ball(5.0, 4.0)))[1] == pytest.approx(5.0, abs=1e-12)
+
+
+def test_a_distance_that_is_not_the_least_bounds_from_above_alone(monkeypatch):
+    a, b = models("boxes_face_to_face", 0.03)
+    nearest = pairs.Nearest(0.03, np.zeros(3), np.array([0.0, 0.0, 0.03]))
+    for is_least, lower in ((True, 0.03 - 1e-6), (False, -np.inf)):
+        monkeypatch.setattr(cad_process, "distance", lambda *_, x=is_least: nearest._replace(is_least=x))
+        distance = exact_distance(a, b, np.eye(4))
+        assert (distance.lower, distance.upper) == (lower, pytest.approx(0.03 + 1e-6))
 
 
 @pytest.mark.parametrize("width", [0.03, 0.04])

@@ -5,14 +5,15 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_NurbsConvert
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_NurbsConvert, BRepBuilderAPI_Transform
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.gp import gp_Pnt
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
 
 from clamp3d.files import faces
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, to_bytes
-from clamp3d.files.tessellation import tessellate
+from clamp3d.files.tessellation import _deviation, tessellate, triangles_of
 from tests.cad import ball, block, cone, cut, first_solid, moved, random_pose, ring, rod
 from tests.public.placed_pairs import arch
 
@@ -35,11 +36,17 @@ def off_face(face, points):
     return np.array([BRepExtrema_DistShapeShape(face, vertex).Value() for vertex in vertices])
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("splines", [False, True])
 @pytest.mark.parametrize("name", SOLIDS)
-def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines):
+def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines, mirrored):
     shape, kinds = SOLIDS[name]
-    brep = to_bytes(first_solid(moved(as_splines(shape) if splines else shape, random_pose(np.random.default_rng(2)))))
+    shape = as_splines(shape) if splines else shape
+    if mirrored:
+        mirror = gp_Trsf()
+        mirror.SetMirror(gp_Ax2(gp_Pnt(1, 2, 3), gp_Dir(1, 1, 0)))
+        shape = BRepBuilderAPI_Transform(shape, mirror, True).Shape()
+    brep = to_bytes(first_solid(moved(shape, random_pose(np.random.default_rng(2)))))
     triangles, form = tessellate(brep, 0.05), faces.surfaces(brep)
     assert set(form.kind.tolist()) == kinds
     corners = triangles.vertices[triangles.faces]
@@ -67,6 +74,44 @@ def test_a_bump_between_the_places_that_open_cascade_looks_at_is_found(monkeypat
         assert not faces._coincides(spline, *data)
     spline.SetPole(4, 2, spline.Pole(4, 2).Translated(faces.occ.gp_Vec(0, 0, 1e-5)))
     assert not faces._coincides(spline, *data)
+
+
+def test_what_bends_up_as_much_as_down_is_no_plane():
+    spline = faces.occ.BRep_Tool.Surface_s(next(explore(as_splines(block((0, 0, 0), (4, 4, 4))), "FACE")))
+    spline.IncreaseDegree(3, 3)
+    plane = faces.occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(1e-7)
+    kind, *data = faces._form(faces.occ.GeomAdaptor_Surface(plane))
+    assert faces._coincides(spline, kind, *data)
+    normal = faces.occ.gp_Vec(*data[0][3].tolist())
+    for u, v, rise in ((2, 2, 1e-5), (3, 2, -1e-5), (2, 3, -1e-5), (3, 3, 1e-5)):  # nothing at the middle
+        spline.SetPole(u, v, spline.Pole(u, v).Translated(normal * rise))
+    assert not faces._coincides(spline, kind, *data)
+
+
+def test_what_open_cascade_takes_for_a_sphere_is_looked_at_once_more(monkeypatch):
+    class Loose(faces.occ.GeomConvert_SurfToAnaSurf):
+        def ConvertToAnalytical(self, _):
+            return super().ConvertToAnalytical(0.1)
+
+    egg = first_solid(as_splines(ball(5)))
+    spline = faces.occ.BRep_Tool.Surface_s(next(explore(egg, "FACE")))
+    spline.SetPole(3, 2, spline.Pole(3, 2).Translated(faces.occ.gp_Vec(0, 0, 1e-5)))
+    monkeypatch.setattr(faces.occ, "GeomConvert_SurfToAnaSurf", Loose)
+    assert faces.surfaces(to_bytes(first_solid(as_splines(ball(5))))).kind.tolist() == [SPHERE]
+    assert faces.surfaces(to_bytes(egg)).kind.tolist() == [OTHER]
+
+
+def test_corners_beside_a_surface_add_to_the_errors_of_its_triangles():
+    shape = first_solid(rod(3, 0, 5))
+    BRepMesh_IncrementalMesh(shape, 0.05)
+    every = [*explore(shape, "FACE")]
+    form = faces.surfaces_of(every)
+    for k, face in enumerate(every):
+        points, triangles, uv = triangles_of(face, k)
+        exact, off = (_deviation(face, form, k, x, triangles, uv) for x in (points, points + form.frame[k, 3] * 0.01))
+        assert (off >= exact - 1e-12).all()
+        if form.kind[k] == PLANE:
+            assert off.min() >= 0.01
 
 
 def test_what_is_only_nearly_a_sphere_is_none():
