@@ -104,6 +104,13 @@ def test_a_hole_that_just_breaks_through_a_face(depth, gap):
     assert d.upper >= truth - 1e-9
 
 
+@pytest.mark.parametrize("z", [-27.0, 0.0, 27.0])
+def test_a_pin_anywhere_in_the_fitted_bore_of_a_long_tube(z):
+    """The bore is as long as the tube, which is longer than it is wide."""
+    tube = mesh_shape(trimesh.creation.annulus(3.0, 8.0, 60.0, sections=48), "round")
+    assert distance(tube, shapes.cylinder(2.9, 4.0), translation(0.0, 0.0, z)).value == pytest.approx(0.1, abs=1e-9)
+
+
 @pytest.mark.parametrize("x", [-15.0, -20.0, -25.0])
 def test_bolt_through_the_wall_of_its_hole(x):
     """The shortest way is back into the hole: 14, 19, 24 mm."""
