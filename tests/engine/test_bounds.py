@@ -80,9 +80,10 @@ def test_bounding_boxes_hold_the_shape(shape):
         assert (body(shape).field(x)[deep > 1e-9] <= 1e-9).all()
 
 
-def test_the_box_of_a_mesh_holds_the_round_surface_through_its_corners():
+@pytest.mark.parametrize("height", [8.0, 800.0])
+def test_the_box_of_a_mesh_holds_the_round_surface_through_its_corners(height):
     """A bar of six flats, none of whose corners is where the cylinder around it reaches furthest along x."""
-    bar = trimesh.creation.cylinder(radius=5.0, height=8.0, sections=6)
+    bar = trimesh.creation.cylinder(radius=5.0, height=height, sections=6)
     bar.apply_transform(rotation((0.0, 0.0, 1.0), math.pi / 6.0))
     low, high = ModelCache().model(mesh_shape(bar, "round")).bounds
     assert low[0] <= -5.0

@@ -125,7 +125,8 @@ def test_poses_inside_are_contained_as_a_check_says():
         (300, 1, 2),
     ]
     poses = np.array([translation(*place) for place in places] + [rotation((1, 0, 0), 1.5), translation(250, 0, 0)])
-    for part, places in (("wire", poses), ("crate", np.array([translation(0, y, 0) for y in (0.0, 60.0, 100.0)]))):
+    beside = np.array([translation(0, y, 0) for y in (0.0, 60.0, 100.0, 160.003, 160.2, 161.0)])
+    for part, places in (("wire", poses), ("crate", beside)):
         sweep = check_poses(scene, part, places)
         for k, T in enumerate(places):
             one = check(scene.moved({part: T}))
