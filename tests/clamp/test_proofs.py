@@ -1,11 +1,12 @@
 """What the proof of a final state rests on, each part alone: a step less and a wrong answer would be called proven."""
 
 import itertools
+import sys
 from dataclasses import replace
 
 import pytest
 
-from clamp3d import load_clamp
+from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
 from clamp3d.clamp import final_state
 from clamp3d.clamp.equilibria import same
@@ -39,6 +40,19 @@ def test_a_state_that_is_off_is_not_proven(wire, shift, monkeypatch):
     monkeypatch.setattr(final_state, "_polish", off)
     with pytest.raises(SolverError, match="final state not proven"):
         solve_final_state(section)
+
+
+def test_a_state_with_play_that_is_not_proven_is_said_to_be_so_beside_the_others(monkeypatch):
+    def fails_first(section, *start, **more):
+        if section.clamp.joints.hole and not section.clamp.joints.saddle:
+            raise SolverError("no proof")
+        return solve_final_state(section, *start, **more)
+
+    monkeypatch.setattr(sys.modules["clamp3d.clamp.assemble"], "solve_final_state", fails_first)
+    hole, *others = assemble(others=True).with_play
+    assert (hole.status, hole.distance) == ("not proven: no proof", None)
+    assert len(others) == 2
+    assert all("not proven" not in play.status for play in others)
 
 
 def test_states_that_differ_in_what_is_loose_are_two(section):
