@@ -110,3 +110,14 @@ def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove():
     for state in beyond:
         assert not section.escaped(state.q)
         assert max(state.violation, state.optimality) <= 1e-9
+
+
+def test_closing_begins_where_the_path_has_been(run):
+    """Where the result says that it starts is a state of the path, seen from the upper half."""
+    start, states = run.start, []
+    for waypoint in run.path:
+        up, down, line, jumper = (waypoint.poses[name] for name in ("P1", "P2", "P6", "P7"))
+        places = [x for wire in (line, jumper) for x in (wire.x - up.x, wire.y - up.y)]
+        states.append([down.y - up.y, down.angle - up.angle, *places])
+    off = np.abs(np.array(states) - [start.closing, start.tilt, *start.line, *start.jumper]).max(axis=1)
+    assert off.min() < 1e-9
