@@ -69,9 +69,9 @@ class Mechanics:
             text += f"\n{bands_to_text(bands)}\n"
             data["friction_band"] = {"bands": [band.to_dict() for band in bands]}
             if self.measured is not None:
-                text += f"{measured_to_text(finder, bands, self.measured)}\n"
-                measured = {"distance_mm": self.measured, "least_friction": finder.friction_for(self.measured)}
-                data["friction_band"]["measured"] = measured
+                least = finder.friction_for(self.measured)
+                text += f"{measured_to_text(finder, bands, self.measured, least)}\n"
+                data["friction_band"]["measured"] = {"distance_mm": self.measured, "least_friction": least}
         return text.removesuffix("\n"), data
 
     def _is_asked(self) -> bool:

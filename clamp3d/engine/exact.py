@@ -31,10 +31,11 @@ def exact_distance(a: Model, b: Model, T: Array) -> Distance:
     """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least."""
     assert a.exact is not None
     assert b.exact is not None
-    gap, p, q, is_least, is_signed = cad_process.distance(a.exact.brep, b.exact.brep, T)
-    lower = gap - TOLERANCE if is_least and (gap > TOLERANCE or is_signed) else -np.inf
-    normal = (q - p) / np.linalg.norm(q - p) if lower > 0.0 else None
-    return Distance(lower, gap + TOLERANCE, p, q, normal, None, "exact", METHOD)
+    nearest = cad_process.distance(a.exact.brep, b.exact.brep, T)
+    gap, way = nearest.distance, nearest.q - nearest.p
+    lower = gap - TOLERANCE if nearest.is_least and (gap > TOLERANCE or nearest.is_signed) else -np.inf
+    normal = way / np.linalg.norm(way) if lower > 0.0 else None
+    return Distance(lower, gap + TOLERANCE, nearest.p, nearest.q, normal, None, "exact", METHOD)
 
 
 def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_each: int = _PROBED) -> Distance:

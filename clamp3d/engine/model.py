@@ -111,8 +111,8 @@ class Model:
 
     @property
     def fine_triangles(self) -> float:
-        """About how many triangles its finest mesh has."""
-        return 0.0
+        """About how many triangles a fine mesh of a solid from CAD has."""
+        raise NotImplementedError
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
         """A mesh of chord error ``chord`` mm; of a bracketed part one that lies ``inside`` of it, or around it."""
@@ -223,16 +223,11 @@ class CadModel(Model):
             return ()
         if not is_closed(coarse.faces):
             return ()
-        return CAD_CHORDS if self._fine_triangles <= _MOST_FINE else CAD_CHORDS[:1]
+        return CAD_CHORDS if self.fine_triangles <= _MOST_FINE else CAD_CHORDS[:1]
 
     @cached_property
     def fine_triangles(self) -> float:
-        """About how many triangles its fine mesh has; infinite if it has none."""
-        return self._fine_triangles if len(self.chords) > 1 else np.inf
-
-    @cached_property
-    def _fine_triangles(self) -> float:
-        """Triangles of a fine mesh, from the errors of a coarse one.
+        """About how many triangles a fine mesh has, from the errors of the coarse one.
 
         On planes, cylinders and cones the error of a triangle is as its width squared, elsewhere as its area.
         """

@@ -22,7 +22,6 @@ _CORNERS = 400
 """Corners of an overlap that are measured."""
 _NO_FURTHER = 1e-3
 """Relative to the greatest distance that was measured: a bound larger by less is sharp."""
-_BEYOND = 1e-6
 _CLEAR = 1e-7
 """Relative to the size: so far beyond a plane nothing is on it, whatever is rounded."""
 _HAIR = 1e-9
@@ -109,7 +108,7 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     that of `_moves_out`. Infinite where one body may be swallowed whole, since the surfaces then say nothing of its
     middle, and of a common part with more triangles than it may be cut into.
     """
-    if 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)) or len(shared.faces) > cuts:
+    if len(shared.faces) > cuts or 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
     bound = np.inf
     for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):

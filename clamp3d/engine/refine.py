@@ -88,9 +88,10 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     from clamp3d.engine.exact import exact_distance, exact_overlap, exact_probe
 
     chords = [chord for chord in a.chords if chord in b.chords]
-    quickly = len(chords) if a.fine_triangles + b.fine_triangles <= _QUICKLY else 1
+    is_large = len(chords) > 1 and a.fine_triangles + b.fine_triangles > _QUICKLY
+    quickly = 1 if is_large else len(chords)
     for chord in chords[:quickly]:
-        yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
+        yield "meshes", _by_meshes(a, b, T, chord, enough)
     yield "exact", exact_distance(a, b, T)
     probe = exact_probe(a, b, T)
     yield "exact", probe
@@ -100,18 +101,18 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     if not cad_forms:
         yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
     for chord in chords[quickly:]:
-        yield "meshes", _by_fine_meshes(a, b, T, chord, enough)
+        yield "meshes", _by_meshes(a, b, T, chord, enough)
     for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
         overlap = exact_overlap(a, b, T, share, attested=attested)
         yield "exact", overlap
         if np.isinf(overlap.lower):  # finer ones take longer
             break
     if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
-        yield "meshes", _by_fine_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
+        yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
 
 
-def _by_fine_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:
-    """What fine meshes say of two solids from CAD; nothing where they take too long to make."""
+def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:
+    """What meshes say of two solids from CAD; nothing where they take too long to make."""
     try:
         return meshes_distance(a, b, T, chord, enough, thorough=thorough, cuts=CUTS if thorough else FEW_CUTS)
     except Clamp3dError:

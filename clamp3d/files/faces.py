@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,8 +56,9 @@ class Surfaces:
     sense: Array
 
 
+@lru_cache(maxsize=512)
 def surfaces(brep: bytes) -> Surfaces:
-    """The surfaces of a solid's faces, in the explorer's order."""
+    """The surfaces of a solid's faces, in the explorer's order; kept, since splines take a while to recognise."""
     return surfaces_of([*explore(from_bytes(brep), "FACE")])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import OTHER, Surfaces, height, surfaces_of
+from clamp3d.files.faces import OTHER, Surfaces, height, surfaces
 from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points
@@ -57,7 +57,7 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
     occ.BRepTools.Clean_s(solid)
     occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
     faces = [*explore(solid, "FACE")]
-    form = surfaces_of(faces)
+    form = surfaces(brep)
     corners, triples, numbers, errors = [], [], [], []
     count = 0
     for k, face in enumerate(faces):
@@ -102,7 +102,7 @@ def points_on(face: Any, uv: Array) -> Array:
 
 
 def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntArray, uv: Array) -> Array:
-    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `SAMPLED`."""
+    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `_FACTORS`."""
     kind, (middles, at) = int(form.kind[k]), (_middles(x[triangles]) for x in (points, uv))
     if kind == OTHER:
         true, corner = points_on(face, at.reshape(-1, 2)), 0.0

@@ -20,9 +20,8 @@ from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.profile import sagitta
 
 _PATCH_SIZES = (24, 96, 384, 1536)  # fourfold: twice as wide, so an arc is four times as high over its chord
-_GATES = tuple(
-    np.radians(a) for a in (12.0, 25.0, 46.0)
-)  # bends within a patch: fine meshes first, then up to MAX_FACET
+_GATES = tuple(np.radians(a) for a in (12.0, 25.0, 46.0))
+"""Bends (rad) within a patch: fine meshes first, then up to `MAX_FACET`."""
 _LEAST = 8
 """Fewest triangles of a patch: flat sides and what was found before leave fewer of a CAD mesh."""
 _MAX_SEEDS = 250  # chosen, against minutes on free forms

@@ -49,9 +49,11 @@ def bands_to_text(bands: Sequence[Band]) -> str:
     return "\n".join(lines)
 
 
-def measured_to_text(finder: FrictionBand, bands: Sequence[Band], measured: float) -> str:
-    """One line: whether a measured splint distance lies in the friction band, and from which friction on."""
-    least = finder.friction_for(measured)
+def measured_to_text(finder: FrictionBand, bands: Sequence[Band], measured: float, least: float | None) -> str:
+    """One line: whether a measured splint distance lies in the friction band, and from which friction on.
+
+    ``least`` is what `FrictionBand.friction_for` says of it.
+    """
     where = ", ".join(f"{'inside' if measured in band else 'outside'} at friction {band.friction:g}" for band in bands)
     needs = (
         "no friction up to 1 explains it"

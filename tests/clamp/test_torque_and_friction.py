@@ -246,10 +246,10 @@ def test_least_friction_of_a_measured_distance(finder):
     assert friction == pytest.approx(brentq(lambda mu: finder.ends(mu)[1] - 31.63, 0.05, 0.2), abs=2e-5)
     assert finder.friction_for(29.147) is None
     assert finder.friction_for(finder.distance) == 0.0
-    text = measured_to_text(finder, [finder.band(0.1)], 31.63)
+    text = measured_to_text(finder, [finder.band(0.1)], 31.63, finder.friction_for(31.63))
     assert "at least 0.106; outside at friction 0.1" in text
     assert len(text.splitlines()) == 1
-    assert "no friction up to 1" in measured_to_text(finder, [], 29.147)
+    assert "no friction up to 1" in measured_to_text(finder, [], 29.147, finder.friction_for(29.147))
 
 
 def test_figure_draws_band_and_marks(finder):
