@@ -114,7 +114,11 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
-    a = SimpleNamespace(exact=1, is_simple=True, chords=(), quick_bodies=None, fine_triangles=math.inf)
+
+    class Unmeshed(SimpleNamespace):
+        fine_triangles = property(fails)
+
+    a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
     assert len(answers) == 5
