@@ -42,11 +42,14 @@ def test_any_open_start_ends_in_the_same_state(clamp):
 def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
     section = Section(clamp, Cas())
     least = solve_final_state(section).q[D]
+    step = 0.29  # none of its multiples is near the least distance
+    stepped = solve_stepped(section, step=step, tilt_step=TILT_STEP)
+    assert 0.1 < stepped.q[D] - least < step
     steps = {}
     for resolution in (0.05, 1e-3):
         tried = []
         found = solve_bisection(
-            section, resolution=resolution, step=STEP, tilt_step=TILT_STEP, progress=lambda *a, t=tried: t.append(a)
+            section, resolution=resolution, step=step, tilt_step=TILT_STEP, progress=lambda *a, t=tried: t.append(a)
         )
         assert -1e-9 <= found.q[D] - least <= resolution
         assert found.gaps.value.min() >= -1e-9
@@ -55,7 +58,7 @@ def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
         assert found.motion_steps >= tried[-1][0]
         assert tried[-1][1] == pytest.approx(found.q[D], abs=1e-12)
         steps[resolution] = found.motion_steps
-    assert steps[1e-3] > steps[0.05] > solve_stepped(section, step=STEP, tilt_step=TILT_STEP).motion_steps
+    assert steps[1e-3] > steps[0.05] > stepped.motion_steps
 
 
 @pytest.mark.parametrize(("model", "aside"), [(Cas(), 0.0), (Cas(), 40.0), (Chords(math.radians(7.0)), 0.0)])
