@@ -13,9 +13,9 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
-from clamp3d.engine.mesh_distance import are_apart, rounding_of
+from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
 from clamp3d.engine.model import Model
-from clamp3d.engine.overlap import Common, common, deepest
+from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.refine import SHARES
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
@@ -32,7 +32,13 @@ _HALVINGS = 5
 _EXACT = 1e-9
 """Error (mm) of a closed form up to which it counts as exact: rounding of a CAD file's points."""
 LONG = 3.0
-"""Ratio of a way out to the interference from which on that is measured exactly too."""
+"""Ratio of a way out to the interference from which on that is bounded by itself: how far a pin is to be moved out of
+its hole says nothing of how much it is too thick.
+"""
+_EXACTLY = 2500
+"""Triangles of an overlap of meshes up to which Open CASCADE bounds the interference in less than a second."""
+_SHARP = 1.1
+"""Ratio to what meshes show at least of an interference: a bound below is sharpened no further."""
 QUICK_CHORD = 0.005
 """Chord error (mm) for depths of solids from CAD where no distances are asked for: half the usual contact threshold."""
 _CLOSE = 1.05
@@ -96,15 +102,19 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     length, direction = _way_out(outer_a, outer_b, T, shared, depth)
     method = distance.method
-    hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it exactly
-    if length > LONG * (depth + hidden) and a.exact is not None and b.exact is not None:
-        from clamp3d.engine.exact import exact_overlap
+    hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it otherwise
+    if length > LONG * (depth + hidden):
+        if a.exact is not None and b.exact is not None and (fine or len(shared.faces) <= _EXACTLY):
+            from clamp3d.engine.exact import exact_overlap
 
-        # A pin's way out of a hole says nothing of how much it is too thick.
-        by_points = exact_overlap(a, b, T, SHARES[1])
-        depth, interference = max(depth, -by_points.upper), (depth, min(interference[1], -by_points.lower))
+            by_itself = exact_overlap(a, b, T, SHARES[1])
+        else:
+            sharp = _SHARP * (depth + hidden)
+            most = hidden + thickness(outer_a, outer_b, T, shared, lambda bound: bound <= sharp, FEW_CUTS)
+            by_itself = replace(distance, lower=-most)
+        depth, interference = max(depth, -by_itself.upper), (depth, min(interference[1], -by_itself.lower))
         upper = min(upper, -depth)
-        method = by_points.method if np.isfinite(by_points.lower) else method
+        method = by_itself.method if np.isfinite(by_itself.lower) else method
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     return replace(
         distance,
