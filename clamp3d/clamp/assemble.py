@@ -10,7 +10,7 @@ from pathlib import Path
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel
-from clamp3d.checks import choice, function, number, text
+from clamp3d.checks import array, choice, function, text
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
@@ -28,10 +28,8 @@ from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
 from clamp3d.errors import SolverError
 
-STEP = 1.0 / 3.0
-"""Move along the bolt of the paper's program in mm (derived from its Table 4)."""
-TILT_STEP = math.radians(1.0)
-"""Turn of the paper's program in rad (derived from its Table 4)."""
+STEP, TILT_STEP = 1.0 / 3.0, math.radians(1.0)
+"""Move along the bolt (mm) and turn (rad) of the paper's program, derived from its Table 4."""
 RESOLUTION = 1e-3
 """Where bisection stops, mm."""
 
@@ -44,8 +42,7 @@ def assemble(
     jumper: WireSize | None = None,
     sequence: str | None = None,
     solver: Solver = "exact",
-    step: float = STEP,
-    tilt_step: float = TILT_STEP,
+    moves: tuple[float, float] = (STEP, TILT_STEP),
     others: bool = False,
     on_waypoint: Callable[[Waypoint], None] | None = None,
     progress: Callable[[int, float], None] | None = None,
@@ -64,8 +61,8 @@ def assemble(
         Order of assembly in place of the clamp's own, in the paper's notation (see `clamp3d.clamp.sequence`).
     solver : {"exact", "stepped", "bisection"}
         How the closed position is found.
-    step, tilt_step : float
-        Moves of the stepped solver, and the first ones of bisection; mm and rad.
+    moves : (float, float)
+        Step (mm) and tilt step (rad) of the stepped solver, and the first ones of bisection.
     others : bool
         Also find the other states that closing can end in, and the distance with the joints' play (exact solver only).
     on_waypoint : callable, optional
@@ -94,7 +91,7 @@ def assemble(
     """
     clamp, model = load_clamp(clamp, line=line, jumper=jumper), model or Cas()
     choice("solver", solver, ("exact", "stepped", "bisection"))
-    step, tilt_step = number("step", step), number("tilt step", tilt_step)
+    step, tilt_step = array("moves", moves, (2,), finite=False).tolist()
     function("on_waypoint", on_waypoint)
     function("progress", progress)
     if sequence is not None:

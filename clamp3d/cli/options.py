@@ -285,7 +285,8 @@ class Method(Quiet):
 
         Raises click.UsageError for options that do not go together.
         """
-        moves = {"sequence": self.sequence, "step": self.step, "tilt_step": self.tilt_step}
+        from clamp3d.clamp.assemble import STEP, TILT_STEP
+
         by_step = self.step is not None or self.tilt_step is not None
         if self.solver == "exact" and by_step:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
@@ -294,8 +295,8 @@ class Method(Quiet):
         if equilibria and solver != "exact":
             raise click.UsageError(f"--equilibria goes with --solver exact, not {solver}")
         others = self.method == "cas" and solver == "exact" if equilibria is None else equilibria
-        chosen = {key: value for key, value in moves.items() if value is not None}
-        return {"solver": solver, "others": others} | chosen
+        moves = STEP if self.step is None else self.step, TILT_STEP if self.tilt_step is None else self.tilt_step
+        return {"solver": solver, "others": others, "sequence": self.sequence, "moves": moves}
 
     def model(self, clamp: Clamp) -> ContactModel:
         """The contact model. Raises InputError for options that do not go with it."""
