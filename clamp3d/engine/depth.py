@@ -35,10 +35,10 @@ LONG = 3.0
 """Ratio of a way out to the interference from which on that is bounded by itself: how far a pin is to be moved out of
 its hole says nothing of how much it is too thick.
 """
-_EXACTLY = 2500
-"""Triangles of an overlap of meshes up to which Open CASCADE bounds the interference in less than a second."""
+_SHARE = 0.02
+"""Chords of the border of a common part, of its thickness, where no distances are asked for: two digits are certain."""
 _SHARP = 1.1
-"""Ratio to what meshes show at least of an interference: a bound below is sharpened no further."""
+"""Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
 QUICK_CHORD = 0.005
 """Chord error (mm) for depths of solids from CAD where no distances are asked for: half the usual contact threshold."""
 _CLOSE = 1.05
@@ -104,14 +104,13 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     method = distance.method
     hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it otherwise
     if length > LONG * (depth + hidden):
-        if a.exact is not None and b.exact is not None and (fine or len(shared.faces) <= _EXACTLY):
+        by_itself = Distance()
+        if a.exact is not None and b.exact is not None:
             from clamp3d.engine.exact import exact_overlap
 
-            by_itself = exact_overlap(a, b, T, SHARES[1])
-        else:
-            sharp = _SHARP * (depth + hidden)
-            most = hidden + thickness(outer_a, outer_b, T, shared, lambda bound: bound <= sharp, FEW_CUTS)
-            by_itself = replace(distance, lower=-most)
+            by_itself = exact_overlap(a, b, T, SHARES[1] if fine else _SHARE)
+        if np.isinf(by_itself.lower):
+            by_itself = replace(distance, lower=-hidden - thickness(outer_a, outer_b, T, shared, _is_sharp, FEW_CUTS))
         depth, interference = max(depth, -by_itself.upper), (depth, min(interference[1], -by_itself.lower))
         upper = min(upper, -depth)
         method = by_itself.method if np.isfinite(by_itself.lower) else method
@@ -124,6 +123,10 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         normal=direction,
         method=f"{method}; separating move by meshes (FCL)",
     )
+
+
+def _is_sharp(bound: float, reached: float) -> bool:
+    return bound <= _SHARP * reached
 
 
 def _depth_mesh(model: Model, fine: bool) -> Surface:

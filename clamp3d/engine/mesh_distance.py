@@ -100,7 +100,11 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
     of_meshes = depth + a.error + b.error  # what was measured there: no bound of the meshes' overlap is less
     if enough(unbounded) or not enough(of_thickness(max(0.0, of_meshes))):
         return unbounded
-    return of_thickness(thickness(a, b, T, shared, lambda bound: enough(of_thickness(bound)), cuts))
+
+    def end(bound: float, reached: float) -> bool:
+        return enough(of_thickness(bound)) or not enough(of_thickness(reached))
+
+    return of_thickness(thickness(a, b, T, shared, end, cuts))
 
 
 def _nothing(_: Distance) -> bool:

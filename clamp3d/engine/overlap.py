@@ -100,8 +100,10 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     return float(depth[k]), points[k]
 
 
-def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Callable[[float], bool], cuts: int) -> float:
-    """Upper bound (mm) of how deep any point of one mesh's surface lies in the other, sharpened until ``is_enough``.
+def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: Callable[[float, float], bool], cuts: int) -> float:
+    """Upper bound (mm) of how deep any point of one mesh's surface lies in the other.
+
+    It is sharpened until ``end(bound, reached)``, of the bound and of a depth that a point has, or ``cuts`` are made.
 
     Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
     corner, and the distance from the whole surface is no larger than that from any one of its triangles. Another is
@@ -113,7 +115,7 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, is_enough: Calla
     bound = np.inf
     for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):
         bound = float(pieces.at_most.max(initial=0.0))
-        if is_enough(bound) or not is_enough(float(pieces.middles.max(initial=0.0))):
+        if end(bound, float(pieces.middles.max(initial=0.0))):
             break
     return bound
 

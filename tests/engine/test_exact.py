@@ -14,6 +14,7 @@ from OCP.gp import gp_Ax3, gp_Sphere
 from OCP.TopoDS import TopoDS_Shell
 
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
@@ -22,7 +23,7 @@ from clamp3d.files import cad_process, pairs
 from clamp3d.files.open_cascade import to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
-from tests.cad import ball, block, cut, first_solid, moved, shift
+from tests.cad import ball, block, cut, first_solid, moved, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -42,6 +43,31 @@ def test_an_interference_is_within_its_bounds_however_coarse_the_border_is(famil
     assert distance.lower <= -0.06 <= distance.upper
     if share < 0.1:
         assert distance.upper - distance.lower <= 0.02
+
+
+@pytest.mark.parametrize("found", [False, True])
+@pytest.mark.parametrize("family", ["taper_in_hub", "ring_in_groove"])
+def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_its_way_out(family, found, monkeypatch):
+    """By meshes where Open CASCADE finds no common part."""
+    if not found:
+        monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
+    a, b = models(family, -0.04)
+    distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.02), fine=False)
+    least, most = distance.interference
+    assert least <= 0.04 <= most
+    assert -distance.lower > 0.5
+    assert ("CASCADE" in distance.method) is found
+    assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
+
+
+def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
+    """A square hole meets a round pin at four lines, which lie between two corners of its facets."""
+    monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
+    plate = cut(block((-20, -20, -5), (20, 20, 5)), block((-8, -8, -6), (8, 8, 6)))
+    a, b = (model_of(BrepSolid.of(first_solid(shape), "x"), Counters()) for shape in (plate, rod(8.04, -9, 9)))
+    for angle in (0.01, 0.03, 0.05):
+        least, most = penetration(a, b, turn((0, 0, 1), angle), Distance(), fine=False).interference
+        assert least <= 0.04 <= most < 0.06
 
 
 @pytest.mark.parametrize("family", FAMILIES)
