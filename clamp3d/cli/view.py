@@ -75,7 +75,7 @@ class Viewing(Quiet):
         from clamp3d.output.viewer_story import ClampStory  # meshcat, for a page alone
 
         finished = None
-        if not as_published(parse_sequence(settings.get("sequence", clamp.sequence))):
+        if not as_published(parse_sequence(settings["sequence"] or clamp.sequence)):
             finished = self.assemble(clamp, model, settings)
         overlays = dict(overlay(clamp, text) for text in self.overlays)
         with self._viewer(ClampStory(clamp, model, self.clearance), serve, overlays) as viewer:

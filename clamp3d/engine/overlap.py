@@ -100,7 +100,9 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     return float(depth[k]), points[k]
 
 
-def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: Callable[[float, float], bool], cuts: int) -> float:
+def thickness(
+    a: Surface, b: Surface, T: Array, shared: Common, end: Callable[[float, float], bool], cuts: int
+) -> float:
     """Upper bound (mm) of how deep any point of one mesh's surface lies in the other.
 
     It is sharpened until ``end(bound, reached)``, of the bound and of a depth that a point has, or ``cuts`` are made.

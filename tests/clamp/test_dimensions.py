@@ -85,6 +85,8 @@ def test_each_rule_holds_up_to_its_limit_and_no_further(path, limit, side, messa
     assert message not in complaint(limit * (1.0 + 1e-6 * side))
     if "centre_depth" not in path and path != "down_splint.width":  # whose messages have other numbers
         assert f"{limit:.4g}"[:5] in wrong
+    if "underside" in message and "centre_depth" in path:
+        assert wrong.endswith(f"{_FLAT:.4g} mm, got {_FLAT:.4g}")
 
 
 def test_a_groove_deeper_than_half_is_widest_inside_the_splint():

@@ -18,6 +18,7 @@ from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.stepped import solve_bisection, solve_stepped
+from tests.clamp.random_clamps import whole_clamp
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,12 @@ def test_gradients_agree_with_differences(clamp, model, aside):
         q[[0, 2]] += -aside, aside
         numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2.0 * h) for e in np.eye(SIZE)]
         assert np.allclose(np.array(numeric).T, section.gaps(q).gradient, atol=2e-6)
+
+
+def test_a_state_is_what_its_poses_say(clamp):
+    section, q = Section(clamp, Cas()), np.zeros(SIZE)
+    q[[0, 1, 2, 3, D, S]] = 1.0, 2.0, -3.0, 4.0, 26.0, 0.5
+    assert section.state(section.poses(q)) == pytest.approx(q, abs=1e-12)
 
 
 def test_curvatures_agree_with_differences_of_gradients(clamp):
@@ -155,3 +162,12 @@ def test_a_loose_wire_in_a_sliver_is_put_down_without_overlap():
     state = solve_final_state(Section(case.clamp, Cas()), case.start)
     assert state.loose == ("P7",)
     assert state.gaps.value.min() >= -1e-9
+
+
+@pytest.mark.parametrize(("k", "loose", "on"), [(1, "P6", "P1"), (2, "P7", "P2"), (11, "P6", "P1"), (11, "P7", "P2")])
+def test_the_clamp_hangs_on_a_loose_line_and_a_loose_jumper_lies_in_it(k, loose, on):
+    section = Section(whole_clamp(np.random.default_rng([77, k])), Cas())
+    state = solve_final_state(section)
+    gaps = [gap for gap, pair in zip(state.gaps.value, state.gaps.pair, strict=True) if pair == (on, loose)]
+    assert loose in state.loose
+    assert min(gaps) == pytest.approx(0.0, abs=1e-6)
