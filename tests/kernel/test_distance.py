@@ -211,6 +211,17 @@ def test_an_axis_that_lies_on_a_face_to_rounding_touches_it(groove, wire, centre
     assert abs(answer.distance[0] + wire.radius) <= answer.error_bound[0]
 
 
+@pytest.mark.parametrize("radius", [0.5, 10.0, 500.0])
+def test_in_the_mouth_of_a_nearly_full_circle_the_lips_are_nearest(radius):
+    """It is as wide as the root of what is rounded in its height, so heights alone do not say what is in it."""
+    half_angle = math.pi - 1e-8
+    for place in (0.0, 0.5):
+        T = translation(place * radius * math.sin(half_angle), -radius * math.cos(half_angle), 0.0)
+        answer = signed_distance(SweptArc(radius, half_angle, 10.0), Capsule(0.1, 4.0), T)
+        true = (1.0 - place) * radius * math.sin(half_angle) - 0.1
+        assert answer.distance == pytest.approx(true, abs=1e-12 * radius)
+
+
 EDGE_POINTS = {  # a point in the middle of each edge of a groove of radius 10, half angle a, half length 20
     Feature.LIP_M: lambda s, h: (-s, h, 3.0),
     Feature.LIP_N: lambda s, h: (s, h, -3.0),

@@ -66,6 +66,11 @@ def test_bolt_that_is_not_in_the_hole() -> None:
     assert (contact.relation, contact.gap_left, contact.gap_right) == (HoleRelation.NONE, math.inf, math.inf)
 
 
+def test_gaps_up_to_the_tolerance_are_contact() -> None:
+    for tolerance, relation in ((1.0, HoleRelation.TWO_POINTS_TWO_SIDES), (1.0 - 1e-12, HoleRelation.NONE)):
+        assert hole_bolt(Rectangle(0.0, 0.0, W, H), BOLT, tolerance=tolerance).relation is relation
+
+
 def test_small_differences_survive_a_large_offset() -> None:
     """Both moved by 1e6 mm (the offset itself is exact in float64): the gap keeps every digit that the position has."""
     far = 2.0**20
