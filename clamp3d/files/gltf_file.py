@@ -39,6 +39,8 @@ _HARMLESS = (
     "MSFT_",
 )
 """Required extensions that change no body, and the one whose numbers are scaled here."""
+_INSTANCES = "EXT_mesh_gpu_instancing"
+"""The extension that places a node's mesh many times, which files may use without requiring it."""
 _TRIANGLES, _STRIP = 4, 5
 _NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a whole number is divided by where an accessor says "normalized"."""
@@ -66,7 +68,9 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
     for n in nodes:
         k = tree["nodes"][n]["mesh"]
         name = str(names[n] or path.stem)
-        if len(meshes[k].pieces) != len(meshes[k].primitives):
+        if _INSTANCES in tree["nodes"][n].get("extensions", {}):
+            placer.add(name, f"its instances ({_INSTANCES}) are not read", np.eye(4))
+        elif len(meshes[k].pieces) != len(meshes[k].primitives):
             placer.add(name, "not readable", np.eye(4))
         elif meshes[k].pieces:
             placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import OTHER, Surfaces, height, surfaces
-from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ
+from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points
 
@@ -24,6 +24,13 @@ _FACTORS = np.array([1.0, 1.0, 2.0, 1.4, 1.4, SAMPLED])
 tori, of which a facet is a small part, it is next to quadratic. Along the edge of a cone from a circle to another one
 of k times its radius it is 2 (1 + k) / (1 + sqrt k)^2 times as far.
 """
+
+_FINER = (1.0, 4.0, 16.0)
+"""How much finer meshes are asked for, one after the other, where the one before overlooks some of a spline."""
+_PLACES_EACH = 5
+"""Places between two knots of a surface that tells no degree."""
+_MOST_PLACES = 20_000
+"""About how many places of a spline are looked at besides its triangles' edges."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,18 +60,21 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
 
     Raises Clamp3dError if a face gets no triangles.
     """
-    solid = from_bytes(brep)
-    occ.BRepTools.Clean_s(solid)
-    occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord, False, ANGLE, False)
+    solid, form = from_bytes(brep), surfaces(brep)
     faces = [*explore(solid, "FACE")]
-    form = surfaces(brep)
+    for finer in _FINER:
+        occ.BRepTools.Clean_s(solid)
+        occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord / finer, False, ANGLE, False)
+        meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
+        overlooked = [_overlooked(*it) for it in zip(faces, form.kind, *zip(*meshes, strict=True), strict=True)]
+        if max((off.max(initial=0.0) for off in overlooked), default=0.0) <= chord:
+            break
     corners, triples, numbers, errors = [], [], [], []
     count = 0
-    for k, face in enumerate(faces):
-        points, triangles, uv = triangles_of(face, k)
+    for k, (face, (points, triangles, uv)) in enumerate(zip(faces, meshes, strict=True)):
         if not len(triangles):
             continue
-        deviation = _deviation(face, form, k, points, triangles, uv)
+        deviation = np.maximum(_deviation(face, form, k, points, triangles, uv), SAMPLED * overlooked[k])
         corners.append(points)
         triples.append(triangles + count)
         count += len(points)
@@ -111,6 +121,54 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
         off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
         corner = float(heights.max())
     return np.asarray(_FACTORS[kind] * off.reshape(-1, 3).max(axis=1) + corner)
+
+
+def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Array) -> Array:
+    """How far (m,) mm a spline is from each of its triangles between the knots, where no edge's middle is near.
+
+    It is looked at in as many places as its degrees ask for: Open CASCADE can overlook a bump of a face that is flat
+    besides.
+    """
+    off = np.zeros(len(triangles))
+    if kind != OTHER or not len(triangles):
+        return off
+    surface = occ.BRepAdaptor_Surface(face)
+    grids = [_grid(surface, along) for along in "UV"]
+    seen = np.concatenate([uv, _middles(uv[triangles]).reshape(-1, 2)])
+    cells = [np.clip(np.searchsorted(grid, x) - 1, 0, len(grid) - 2) for grid, x in zip(grids, seen.T, strict=True)]
+    empty = np.ones([len(grid) - 1 for grid in grids], dtype=bool)
+    empty[tuple(cells)] = False
+    middles = [0.5 * (grid[1:] + grid[:-1])[rows] for grid, rows in zip(grids, np.nonzero(empty), strict=True)]
+    at = np.column_stack(middles)[:: 1 + int(empty.sum()) // _MOST_PLACES]
+    if len(at):
+        import igl
+
+        flat, places = (np.column_stack([x, np.zeros(len(x))]) for x in (uv, at))
+        square, row, _ = igl.point_mesh_squared_distance(places, flat, np.ascontiguousarray(triangles))
+        on_face = square <= (1e-9 * np.abs(uv).max()) ** 2
+        row, true = row[on_face], points_on(face, at[on_face])
+        np.maximum.at(off, row, np.linalg.norm(closest_points(points[triangles[row]], true) - true, axis=1))
+    return off
+
+
+def _grid(surface: Any, along: str) -> Array:
+    """Parameters (n,) of a BRepAdaptor_Surface along "U" or "V": as many between knots as its degree asks for."""
+    every = occ.GeomAbs_Shape.GeomAbs_CN
+    knots = _numbers(getattr(surface, f"Nb{along}Intervals")(every) + 1)
+    getattr(surface, f"{along}Intervals")(knots, every)
+    kinds = occ.GeomAbs_SurfaceType
+    has_degree = surface.GetType() in (kinds.GeomAbs_BSplineSurface, kinds.GeomAbs_BezierSurface)
+    each = max(2, getattr(surface, f"{along}Degree")()) if has_degree else _PLACES_EACH
+    starts = np.array([*knots])
+    inner = starts[:-1, None] + np.diff(starts)[:, None] * (np.arange(each) / each)
+    return np.append(inner.reshape(-1), starts[-1])
+
+
+def _numbers(count: int) -> Any:
+    """An array of Open CASCADE for so many numbers, by the name that it has in this version or had before."""
+    OCP = require_open_cascade()
+    made = getattr(OCP.collections, "Array1_double", None) if hasattr(OCP, "collections") else None
+    return (made or occ.TColStd_Array1OfReal)(1, count)
 
 
 def _middles(corners: Array) -> Array:

@@ -141,6 +141,10 @@ def bad_cube(g, accessor=None, **primitive):
             lambda g: g.data.update(extensionsRequired=["EXT_meshopt_compression"]),
             "needs EXT_meshopt_compression, which is not read",
         ),
+        (
+            lambda g: g.node(name="bad", mesh=0, extensions={"EXT_mesh_gpu_instancing": {"attributes": {}}}),
+            r"missing: bad \(its instances \(EXT_mesh_gpu_instancing\) are not read\)",
+        ),
         (lambda g: g.data.update(scenes=[{"nodes": [0, 0]}]), "in the tree twice"),
         (lambda g: g.node(rotation=[0.0, 0.0, 0.0, 2.0]), "rotation of a node must be a quaternion of length 1, got"),
         (lambda g: bad_cube(g, lambda accessor: accessor.update(count=10**9)), "not a readable GLTF file"),

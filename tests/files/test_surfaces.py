@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from igl import point_mesh_squared_distance
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
@@ -138,3 +139,42 @@ def test_no_triangle_is_further_from_its_face_than_its_error(name, splines):
         points = np.vstack([rng.dirichlet(np.ones(3), 9) @ corners, corners.mean(axis=0), middles])
         assert off_face(every[triangles.face[row]], points).max() <= triangles.errors[row] + 1e-7
     assert triangles.errors.max() < 0.15
+
+
+def bumpy(count, at, height):
+    """A spline over 40 x 40 mm, flat but for a bump, with the highest of ``count`` x ``count`` poles at ``at``."""
+    try:
+        from OCP.collections import Array1_double as Reals
+        from OCP.collections import Array1_int as Integers
+        from OCP.collections import Array2_gp_Pnt as Points
+    except ModuleNotFoundError:
+        from OCP.TColgp import TColgp_Array2OfPnt as Points
+        from OCP.TColStd import TColStd_Array1OfInteger as Integers
+        from OCP.TColStd import TColStd_Array1OfReal as Reals
+    ends = np.linspace(0.0, 40.0, count - 2)
+    every = np.concatenate([[0.0] * 3, ends, [40.0] * 3])
+    across = [float(every[k + 1 : k + 4].mean()) for k in range(count)]
+    poles, knots, times = Points(1, count, 1, count), Reals(1, count - 2), Integers(1, count - 2)
+    for i, j in np.ndindex(count, count):
+        poles.SetValue(i + 1, j + 1, gp_Pnt(across[i], across[j], height if (i, j) == at else 0.0))
+    for k, knot in enumerate(ends.tolist()):
+        knots.SetValue(k + 1, knot)
+        times.SetValue(k + 1, 4 if k in (0, count - 3) else 1)
+    return faces.occ.Geom_BSplineSurface(poles, knots, knots, times, times, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("count", "at", "offset"), [(21, (7, 12), 0.0), (21, (7, 12), 1.0), (41, (13, 26), 0.0), (81, (29, 51), 1.0)]
+)
+def test_no_bump_of_a_spline_is_overlooked(count, at, offset):
+    """Open CASCADE's own mesh of 0.1 mm leaves out all of a bump that is 0.89 mm high."""
+    surface = bumpy(count, at, 2.0)
+    if offset:
+        surface = faces.occ.Geom_OffsetSurface(surface, offset)
+    made = tessellate(to_bytes(faces.occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()), 0.1)
+    u, v = (40.0 * (index - 1) / (count - 3) for index in at)
+    true = [surface.Value(u + du, v + dv).Coord() for du in np.linspace(-3, 3, 25) for dv in np.linspace(-3, 3, 25)]
+    assert max(z for _, _, z in true) > offset + 0.8
+    assert made.vertices[:, 2].max() > offset + 0.7
+    away, row, _ = point_mesh_squared_distance(np.array(true), made.vertices, made.faces)
+    assert (np.sqrt(away) <= made.errors[row] + 0.01).all()  # where a knot is inside a triangle twice is not enough
