@@ -131,4 +131,4 @@ class Accept:
         path = accepted_file(self.source)
         entries = accept(path, self.identifiers, why=self.why, who=self.who)
         before = len(set(self.identifiers)) - len(entries)
-        show(f"{path}: {len(entries)} accepted" + (f", {before} before" if before else ""))
+        show(f"{path}: {len(entries)} accepted" + (f", {before} already there and left as before" if before else ""))

@@ -203,7 +203,12 @@ def read_accepted(path: Path) -> dict[str, Accepted]:
 
 
 def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -> list[Accepted]:
-    """Add findings to the file of accepted ones, and return what was added. Raises InputError for a bad identifier."""
+    """Add findings to the file of accepted ones, and return what was added.
+
+    Raises InputError for a bad identifier, and without a reason.
+    """
+    if not why.strip():
+        raise InputError(f"the reason (--why) must not be empty, got {why!r}")
     present = read_accepted(path)
     for identifier in identifiers:
         if not re.fullmatch(r"[0-9a-f]{8}", identifier):
@@ -212,7 +217,8 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
     entries = [Accepted(i, who or getpass.getuser(), date.today().isoformat(), why) for i in new]
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     for entry in entries:
-        fields = (f"{key} = {json.dumps(getattr(entry, key))}\n" for key in ("id", "who", "when", "why"))
+        keys = ("id", "who", "when", "why")  # TOML has no surrogate pairs, which ASCII alone would need
+        fields = (f"{key} = {json.dumps(getattr(entry, key), ensure_ascii=False)}\n" for key in keys)
         text += "[[accepted]]\n" + "".join(fields) + "\n"
     if entries:
         write_text(path, text)

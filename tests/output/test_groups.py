@@ -170,12 +170,13 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     ids = sorted(line["id"] for line in lines)
     code, out, _ = main("accept", "boxes.toml", *ids, "--why", 'a "press" fit', "--who", "Ada")
     assert (code, out) == (0, "boxes.accepted.toml: 2 accepted\n")
-    assert main("accept", "boxes.toml", ids[0], "--why", "again")[1] == "boxes.accepted.toml: 0 accepted, 1 before\n"
+    out = main("accept", "boxes.toml", ids[0], "--why", "again")[1]
+    assert out == "boxes.accepted.toml: 0 accepted, 1 already there and left as before\n"
     code, out, _ = main("check", "boxes.toml")
     assert code == 0
     assert out.count("accepted by Ada on 20") == 2
     assert "no finding now" not in out
-    main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen")
+    main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen \U0001f600 größe \x07")
     assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 8})
     assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
@@ -193,6 +194,7 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
         (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 digits 0-9a-f"),
         (("accept", "boxes.toml", "00000000"), {}, "Missing option '--why'"),
+        (("accept", "boxes.toml", "00000000", "--why", " "), {}, "the reason (--why) must not be empty, got ' '"),
     ],
 )
 def test_bad_baselines_and_identifiers_are_one_line(arguments, files, message, tmp_path, monkeypatch, main):
