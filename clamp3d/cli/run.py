@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from clamp3d import checks
 from clamp3d.cli.options import JSON, ClampSource, Method, command, number, option
 from clamp3d.cli.terminal import finish, save, show
 from clamp3d.cli.view import Viewing
@@ -42,7 +43,9 @@ class Mechanics:
     )
 
     def check_mechanics(self, solver: str) -> None:
-        """Raise click.UsageError for options that do not go together."""
+        """Raise click.UsageError for options that do not go together, InputError for a distance that is not > 0."""
+        if self.measured is not None:
+            checks.positive("--measured", self.measured)
         if self.friction is not None and self.torque is None:
             raise click.UsageError("--friction goes with --torque")
         if self._is_asked() and solver != "exact":
@@ -120,8 +123,8 @@ class Run(ClampSource, Method, Mechanics, Viewing):
         finish(not result.passed)
 
     def _show(self, result: Assembly) -> None:
+        text, data = self.mechanics(result)  # first: it may refuse a value
         show(run_to_text(result))
-        text, data = self.mechanics(result)
         if text:
             show(text)
         save(self.json_file, lambda: result.to_dict() | data)

@@ -262,6 +262,20 @@ def test_clamp_with_a_wire_outside_its_arcs_is_refused():
         FrictionBand(load_clamp(line="LJ-16", jumper="LJ-16"))
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--torque", "-80"), "torque must be > 0 and at most 1e6 Nm, got -80"),
+        (("--torque", "80", "--friction", "0,1"), "friction must be > 0 and at most 1, got 0, 1"),
+        (("--measured", "-3"), "--measured must be a finite length > 0 mm, got -3"),
+    ],
+)
+def test_command_refuses_a_value_before_it_prints_anything(arguments, message, main):
+    code, out, err = main("run", "--quiet", "--no-equilibria", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+
+
 def test_command(finder, monkeypatch, main):
     monkeypatch.setattr("clamp3d.clamp.friction.FrictionBand", lambda _: finder)  # with its own: docs/usage.md
     code, out, _ = main("run", "--quiet", "--no-equilibria", "--torque", "80", "--measured", "31.63", "--json", "-")
