@@ -56,7 +56,11 @@ def couples(text: str, separator: str, example: str) -> list[tuple[str, str]]:
 
 def joint_values(text: str) -> dict[str, float]:
     """Values by the names of joints, as the type of an option."""
-    return {name: number(value) for name, value in couples(text, "=", "elbow=1.57,slide=20")}
+    values = couples(text, "=", "elbow=1.57,slide=20")
+    names = [name for name, _ in values]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise click.BadParameter(f"must give each joint once, got {twice} {names.count(twice)} times")
+    return {name: number(value) for name, value in values}
 
 
 class Output(click.Path):

@@ -121,6 +121,8 @@ def load_bodies(
         checks.choice("unit", unit, UNITS_MM)
         if is_robot or FORMATS[kind].unit == "stated":
             raise InputError(f"unit: {kind[1:].upper()} files state their unit themselves")
+    if not isinstance(joints, Mapping | None):
+        raise InputError(f"joints must be a dict from names to values, got {checks.shown(joints)}")
     values = {str(name): checks.number(f"joint {name}", value) for name, value in (joints or {}).items()}
     return read_in_process(file, values if is_robot else unit).complete(file, partial=partial)
 

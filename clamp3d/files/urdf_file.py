@@ -35,6 +35,10 @@ except ImportError:
     raise missing("yourdfpy", "URDF") from None
 
 
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+"""Those of the URDF specification."""
+
+
 def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
     """The shapes of a robot's links in mm, in the frame of the root link, at the values of its ``joints``.
 
@@ -124,6 +128,8 @@ def _check_whole(root: ElementTree.Element) -> None:
     for item in (*root.iterfind("link/collision"), *root.iterfind("link/visual")):
         if (count := len(item.findall("geometry/*"))) != 1:
             raise InputError(f"each {item.tag} of a link must have 1 shape, got {count}")
+    for joint in root.findall("joint"):
+        checks.choice(f"type of joint {joint.get('name')}", joint.get("type"), JOINT_TYPES)
     tree: Any = networkx.MultiDiGraph()
     tree.add_nodes_from(link.get("name") for link in root.findall("link"))
     count = len(tree)

@@ -66,6 +66,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["run", "--solver", "exact", "--step", "1"], "--step and --tilt-step-deg go with --solver stepped"),
         (["run", "--json"], "requires an argument"),
         (["check", "a.urdf", "--joints", "elbow"], "must read like elbow=1.57,slide=20, got 'elbow'"),
+        (["check", "a.urdf", "--joints", "a=1,b=2,a=3"], "must give each joint once, got a 2 times"),
         (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
         (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
         (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),

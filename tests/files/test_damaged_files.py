@@ -236,6 +236,8 @@ MORE = '<parent link="tip"/><child link="end"/>'
         ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
         ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
         ('radius="0.012"', 'radius="-1"', r"missing: tip \(radius of a sphere must be"),
+        ('"turn" type="fixed"', '"turn" type="revolut"', "type of joint turn must be one of revolute, .*got 'revolut'"),
+        ('"turn" type="fixed"', '"turn"', "type of joint turn must be one of revolute, .*got None"),
         ("robot", "robots", "it holds <robots>, not <robot>"),
     ],
 )  # fmt: skip
@@ -247,6 +249,12 @@ def test_a_robot_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     count = -1 if text == "robot" else 1
     (folder / "arm.urdf").write_text(ROBOT.replace(text, instead, count))
     refused(folder / "arm.urdf", message)
+
+
+def test_joint_values_are_a_dict(tmp_path):
+    (tmp_path / "arm.urdf").write_text(ROBOT)
+    with pytest.raises(InputError, match=r"^joints must be a dict from names to values, got \[0, 1\]$"):
+        load(tmp_path / "arm.urdf", joints=[0, 1])
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
