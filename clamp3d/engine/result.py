@@ -180,7 +180,8 @@ class CheckResult:
         need("pandas", "frame(), but not table(),")
         import pandas  # type: ignore[import-untyped,unused-ignore]
 
-        return pandas.DataFrame(self.table())
+        columns = PairResult("", "", Verdict.CLEAR, Distance()).to_dict()  # also where there is no row
+        return pandas.DataFrame(self.table(), columns=None if self.rows else list(columns))
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.counts.items()) or "no pairs"

@@ -34,6 +34,14 @@ def clamp(run):
     return replace(run.scene, allowed=(), clearance=0.5)
 
 
+def test_a_frame_without_rows_has_the_columns_of_one_with_rows():
+    pytest.importorskip("pandas")
+    scenes = [Scene().add("a", BOX).add("b", BOX, translation(0, 0, z)) for z in (1.0, 50.0)]
+    frames = [check(scene).frame() for scene in scenes]
+    assert [len(frame) for frame in frames] == [1, 0]
+    assert frames[0].columns.tolist() == frames[1].columns.tolist()
+
+
 @pytest.fixture(scope="module")
 def pack():
     loader = importlib.machinery.SourceFileLoader("measure_scenes", str(ROOT / "scripts" / "measure-scenes"))
