@@ -49,8 +49,8 @@ class Check(Source, Quiet):
     INPUT is a scene file, a file or folder with the parts (STEP, GLB, 3MF, URDF, STL, OBJ, PLY, OFF), or a clamp (a
     built-in name or a TOML file), which is assembled first and measured in all its pairs. Findings with one cause are
     one line; those that `clamp3d accept` has written to INPUT.accepted.toml are not counted. Exit code 1 if parts
-    clash or the clamp does not close as it should, else 4 if a pair failed, else 3 if one is undecided, and 2 if there
-    are no two parts.
+    clash or the clamp does not close as it should, else 4 if a pair failed, else 3 if one is undecided, and 2 for
+    fewer than two parts.
     """
 
     source: str = argument(metavar="INPUT", required=True, shell_complete=complete_inputs)
@@ -111,7 +111,7 @@ class Check(Source, Quiet):
         verdicts = {group.verdict for group in comparison.open(groups)}
         finish(assembled is not None and not assembled.passed, verdicts=verdicts)
         if not result.work.pairs:
-            raise InputError("there are no two parts to check")
+            raise InputError("fewer than two parts: nothing to check")
 
 
 @command("accept")

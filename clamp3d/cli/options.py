@@ -181,7 +181,7 @@ JSON = option("Write the result as JSON; - is stdout.", "--json")
 class Quiet:
     """Whether progress and notes are shown."""
 
-    quiet: bool = option("No progress and no notes.", "--quiet", "-q")
+    quiet: bool = option("No progress and no notes on stderr.", "--quiet", "-q")
 
     def assemble(
         self, clamp: Clamp, model: ContactModel, settings: Mapping[str, Any], *listeners: Callable[[Waypoint], None]

@@ -88,7 +88,7 @@ class Scene:
             object.__setattr__(self, key, values)
         for k, part in enumerate(self.parts):
             if self._index[part.name] > k:
-                raise InputError(f"part {part.name!r} is there twice; names must differ")
+                raise InputError(f"part {part.name!r} exists already; names must differ")
         for item in self.allowed:
             self._check_allowed(item)
         for motion in self.motions:
@@ -145,7 +145,7 @@ class Scene:
         elif shape is not None or T_world is not None:
             raise InputError("add() takes a Part alone, or a name with a shape and a pose")
         if part.name in self._index:
-            raise InputError(f"part {part.name!r} is there twice; names must differ")
+            raise InputError(f"part {part.name!r} exists already; names must differ")
         scene = self._with(parts=(*self.parts, part))
         object.__setattr__(scene, "_index", {**self._index, part.name: len(self.parts)})
         return scene

@@ -133,7 +133,7 @@ def headline(result: CheckResult) -> str:
     if result.scene.motions:
         checked += f" and {counted(len(result.scene.motions), 'motion')}"
     if not result.work.pairs:
-        return "Nothing checked: there are no two parts"
+        return "Nothing checked: fewer than two parts"
     if not phrases:
         return f"Clean: {checked} checked, nothing clashes"
     decided = not count[Verdict.FAILED] and not count[Verdict.UNCERTAIN]

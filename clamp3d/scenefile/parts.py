@@ -154,7 +154,7 @@ def _folder(folder: Path, reader: Reader) -> Scene:
     """Every geometry file of a folder, in the order of their names, each where the table of poses puts it."""
     files = sorted(f for f in folder.iterdir() if f.suffix.lower() in FORMATS and f.is_file())
     if not files:
-        raise InputError(f"{checks.short(folder)}: no geometry file in the folder; read are {', '.join(FORMATS)}")
+        raise InputError(f"{checks.short(folder)}: no geometry file in the folder; choices: {', '.join(FORMATS)}")
     places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
     named: dict[str, Path] = {}
     for file in files:

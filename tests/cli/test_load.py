@@ -71,7 +71,7 @@ def test_a_mesh_is_one_part(suffix, tmp_path):
         ),
         ("bad.toml", {}, "bad.toml: not valid TOML: "),
         ("none.toml", {}, "none.toml: the scene has no parts; add [parts.NAME], include or [clamp]"),
-        ("folder", {}, "folder: no geometry file in the folder; read are .stl, .obj"),
+        ("folder", {}, "folder: no geometry file in the folder; choices: .stl, .obj"),
         ("scene.toml", {"line": "LJ-500"}, "line goes with a clamp, not with scene.toml"),
         ("cube.stl", {"jumper": "16"}, "jumper goes with a clamp, not with cube.stl"),
         ("reference", {"unit": "mm"}, "unit goes with a mesh file, not with reference"),

@@ -147,7 +147,7 @@ def test_poses_inside_are_contained_as_a_check_says():
     [
         (lambda: Scene().add("a:b", BOX), "part name must not"),
         (lambda: Scene().add("a b", BOX), "part name must not be empty or hold a space"),
-        (lambda: Scene().add("a", BOX).add("a", BOX), "'a' is there twice"),
+        (lambda: Scene().add("a", BOX).add("a", BOX), "'a' exists already; names must differ"),
         (lambda: Scene().add(Part("a", BOX), BOX), "takes a Part alone"),
         (lambda: Scene().add("a", SweptArc(7, 1, 50)), "make a part of it with groove_block"),
         (lambda: Part("a", BOX, np.diag([2.0, 1, 1, 1])), "pose of a must be rigid"),
