@@ -33,7 +33,7 @@ def _summary(assembly: Assembly) -> Iterator[str]:
     yield f"clamp {clamp.name}: line {line}, jumper {jumper}; method {assembly.method}, {assembly.solver}{limits}"
     yield (
         f"{assembly.status}; distance between the splints {assembly.distance:.3f} mm, "
-        f"tilt {math.degrees(assembly.tilt):.2f} deg, nut turned {assembly.turns:.2f} times from open"
+        f"tilt {math.degrees(assembly.tilt):z.2f} deg, nut turned {assembly.turns:.2f} times from open"
     )
     if assembly.with_play:
         yield "with play: " + ", ".join(map(_play, assembly.with_play))
@@ -41,7 +41,7 @@ def _summary(assembly: Assembly) -> Iterator[str]:
         pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
         yield f"contact forces per newton of bolt force: {pushes}"
         yield from (
-            f"sideways {f.force:.3f} is left over: the down splint is taken as {f.feature} (joints in the clamp file)"
+            f"a sideways force of {f.force:.3f} is not balanced: the down splint is assumed {f.feature} (see [joints])"
             for f in assembly.forces
             if f.feature == HELD
         )

@@ -28,6 +28,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.kernel import translation
 from clamp3d.output import placed, serving
 from clamp3d.output.palette import PART_COLOURS, VERDICT_COLOURS, part_colours
+from clamp3d.output.run_report import run_to_text
 from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer
 from clamp3d.output.viewer_story import ClampStory
@@ -36,6 +37,14 @@ from tests.cli.boxes import boxes
 
 def commands_of(viewer):
     return [umsgpack.unpackb(base64.b64decode(message)) for message in viewer._log.messages()]
+
+
+def test_text_and_page_print_the_same_tilt_and_no_negative_zero(tmp_path):
+    for wires, tilt in ((dict(jumper=40), "-3.53"), (dict(line=5, jumper=5), "0.00")):
+        assembly = assemble("reference", **wires)
+        view(assembly, serve=False).save_html(tmp_path / "page.html")
+        assert f" tilt {tilt} deg" in run_to_text(assembly)
+        assert f"tilt of the down splint {tilt}&deg;" in (tmp_path / "page.html").read_text()
 
 
 @pytest.fixture(scope="module")
