@@ -112,7 +112,7 @@ class MeshShape:
 
 
 Shape: TypeAlias = Solid | MeshShape
-AnyShape: TypeAlias = Shape | Cylinder | Capsule | SweptArc
+AnyShape: TypeAlias = Shape | Mesh | Cylinder | Capsule | SweptArc
 
 
 def _drilled(name: str, body: Extrusion, holes: Sequence[Hole], low: Array, high: Array) -> Solid:
@@ -326,7 +326,7 @@ def groove_block(
 
 
 def as_shape(shape: Any) -> Shape:
-    """The shape that a scene works on: a bare cylinder as a solid, a mesh of trimesh in mm, others as they are.
+    """The shape that a scene works on: a bare cylinder as a solid, a mesh as its facets (mm), others as they are.
 
     Raises InputError for a `SweptArc` (it has no outer faces), for a `Capsule` and for anything that is no shape.
     """
@@ -334,6 +334,8 @@ def as_shape(shape: Any) -> Shape:
         return shape
     if isinstance(shape, Cylinder):
         return cylinder(shape.radius, shape.length)
+    if isinstance(shape, Mesh):
+        return MeshShape(shape)
     if isinstance(shape, Capsule):
         raise InputError(
             "a Capsule is measured against a SweptArc only (kernel.signed_distance, first_contact, min_clearance); "
@@ -344,5 +346,5 @@ def as_shape(shape: Any) -> Shape:
     if type(shape).__module__.startswith("trimesh") and hasattr(shape, "faces"):
         return MeshShape(make_mesh(shape.vertices, shape.faces))
     raise InputError(
-        f"a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got {type(shape).__name__}"
+        f"a part's shape must be a Solid, MeshShape, Mesh, Cylinder or a mesh of trimesh, got {type(shape).__name__}"
     )

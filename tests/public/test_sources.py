@@ -19,12 +19,13 @@ def boxes(tmp_path):
     scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="a", geom_name="a")
     scene.add_geometry(trimesh.creation.box((10, 10, 10)), node_name="b", geom_name="b", transform=T)
     box = shapes.box(10, 10, 10)
+    cube = trimesh.creation.box((10, 10, 10))
     drawn = clamp3d.Scene().add("a", box).add("b", box, T)
     clamp3d.export(drawn, tmp_path / "two.glb")
     return {
         "path": tmp_path / "two.glb",
         "list": [("a", box), ("b", box, T)],
-        "meshes": [("a", trimesh.creation.box((10, 10, 10))), ("b", trimesh.creation.box((10, 10, 10)), T)],
+        "meshes": [("a", cube), ("b", shapes.make_mesh(cube.vertices, cube.faces), T)],
         "trimesh": scene,
         "scene": drawn,
     }
@@ -50,7 +51,7 @@ def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path):
     ("source", "message"),
     [
         ([1], r"a list of parts must hold \(name, shape\) or \(name, shape, pose\), got 1"),
-        ([("a", 5)], "a part's shape must be a Solid, MeshShape, Cylinder or a mesh of trimesh, got int"),
+        ([("a", 5)], "a part's shape must be a Solid, MeshShape, Mesh, Cylinder or a mesh of trimesh, got int"),
     ],
 )
 def test_what_is_no_source_is_refused_in_one_line(source, message):
