@@ -115,6 +115,8 @@ def load_bodies(
     file = checks.path("mesh", path)
     kind = file.suffix.lower()
     is_robot = kind == ROBOT and joints is not None
+    if file.is_dir():
+        raise InputError(f"{file}: a folder, not one file ({', '.join(FORMATS)})")
     if kind not in FORMATS and not is_robot:
         raise InputError(f"{file}: unknown mesh format {kind or '(none)'!r}; available: {', '.join(FORMATS)}")
     if unit is not None:

@@ -65,6 +65,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["run", "--step", "-1"], "step must be > 0 mm, got -1"),
         (["run", "--solver", "exact", "--step", "1"], "--step and --tilt-step-deg go with --solver stepped"),
         (["run", "--json"], "requires an argument"),
+        (["fit", "."], ".: a folder, not one file (.stl, .obj"),
         (["check", "a.urdf", "--joints", "elbow"], "must read like elbow=1.57,slide=20, got 'elbow'"),
         (["check", "a.urdf", "--joints", "a=1,b=2,a=3"], "must give each joint once, got a 2 times"),
         (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
