@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
-from clamp3d.clamp.contact import Contact, measure_contacts, overlap
+from clamp3d.clamp.contact import Contact, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
 from clamp3d.clamp.matrix import Difference, Pair, plain
@@ -256,11 +256,6 @@ class Assembly:
         """The parts at a waypoint of `path` as a scene."""
         instance("waypoint", waypoint, Waypoint)
         return clamp_scene(self.clamp, {part: waypoint.T_world(part) for part in waypoint.poses})
-
-    def contacts_at(self, waypoint: Waypoint) -> tuple[Contact, ...]:
-        """How all 21 pairs stand at a waypoint of `path`."""
-        instance("waypoint", waypoint, Waypoint)
-        return measure_contacts(self.clamp, waypoint.poses, self.model)
 
     @property
     def matrix(self) -> dict[Pair, Contact]:
