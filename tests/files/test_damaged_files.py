@@ -1,6 +1,5 @@
 """Damaged and hostile files of every format: refused in one line that names the fault, or read right."""
 
-import json
 import os
 import struct
 import subprocess
@@ -16,7 +15,9 @@ from clamp3d import InputError, load
 from clamp3d.files.bodies import unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
+from tests.files.test_gltf import Gltf
 from tests.files.threemf import TIP, doubled, write_3mf
+from tests.scenefile.test_parts import ROBOT
 
 ROOT = Path(__file__).parents[2]
 PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()
@@ -183,23 +184,15 @@ def test_a_reader_that_ends_by_a_signal_is_said_and_the_next_file_is_read(tmp_pa
 
 
 def test_a_gltf_reads_nothing_outside_of_its_folder(tmp_path, monkeypatch):
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
-    path = tmp_path / "cell" / "a.gltf"
+    made, path = Gltf(), tmp_path / "cell" / "a.gltf"
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    made.node(mesh=made.mesh({"attributes": {"POSITION": made.numbers(corners)}}))
     path.parent.mkdir()
     for file in (tmp_path / "secret.bin", path.parent / "own file.bin"):
-        file.write_bytes(corners)
+        file.write_bytes(made.binary)
 
     def triangles(uri):
-        data = {
-            "asset": {"version": "2.0"},
-            "buffers": [{"uri": uri, "byteLength": 36}],
-            "bufferViews": [{"buffer": 0, "byteLength": 36}],
-            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "nodes": [{"mesh": 0}],
-        }
-        path.write_text(json.dumps(data))
-        return len(load(path).parts[0].shape.mesh.faces)
+        return len(load(made.write(path, uri)).parts[0].shape.mesh.faces)
 
     for uri in ("../secret.bin", str(tmp_path / "secret.bin"), "%2e%2e/secret.bin", "http://127.0.0.1:9/x.bin"):
         with pytest.raises(InputError, match=r"outside of its folder|No such file"):
@@ -209,35 +202,28 @@ def test_a_gltf_reads_nothing_outside_of_its_folder(tmp_path, monkeypatch):
     assert triangles("../secret.bin") == 1
 
 
-ROBOT = """<robot name="arm">
-  <link name="base"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
-  <link name="tip"><collision><geometry><sphere radius="0.012"/></geometry></collision></link>
-  <link name="end"><collision><geometry><sphere radius="0.012"/></geometry></collision></link>
-  <joint name="turn" type="fixed"><parent link="base"/><child link="tip"/><origin xyz="0 0 0.05"/></joint>
-  <joint name="more" type="fixed"><parent link="tip"/><child link="end"/><origin xyz="0 0.01 0.02"/></joint>
-</robot>"""
-MORE = '<parent link="tip"/><child link="end"/>'
+BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="tip"/>'
 
 
 @pytest.mark.parametrize(
     ("text", "instead", "message"),
     [
         (ROBOT[300:], "", "not a readable URDF file"),
-        ('  <link name="end">', '</robot>\n  <link name="end">', "not a readable URDF file .*junk after doc"),
-        (MORE, '<parent link="end"/><child link="tip"/>', "one tree of all links"),
-        (MORE, '<parent link="end"/><child link="end"/>', "one tree of all links"),
-        (MORE, '<parent link="tip"/><child link="arm"/>', "a joint must connect links, got 'arm'"),
-        (ROBOT[ROBOT.index("  <joint name=\"more\"") : -9], "", "one tree of all links"),
-        ('"end"><c', '"tip"><c', "2 of its links are called 'tip'"),
+        ('  <link name="tip">', '</robot>\n  <link name="tip">', "not a readable URDF file .*junk after doc"),
+        (SLIDE, '<parent link="tip"/><child link="rail"/>', "one tree of all links"),
+        (SLIDE, '<parent link="tip"/><child link="tip"/>', "one tree of all links"),
+        (SLIDE, '<parent link="rail"/><child link="arm"/>', "a joint must connect links, got 'arm'"),
+        (ROBOT[ROBOT.index("  <joint name=\"slide\"") : -9], "", "one tree of all links"),
+        ('"rail"><v', '"tip"><v', "2 of its links are called 'tip'"),
         ('<link name="tip">', "<link>", "not a readable URDF file"),
         ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
-        ('<box size="0.1 0.1 0.02"/>', "", "each collision of a link must have 1 shape, got 0"),
-        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
-        ('<box size="0.1 0.1 0.02"/>', '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
-        ('radius="0.012"', 'radius="big"', "not a readable URDF file"),
-        ('radius="0.012"', 'radius="-1"', r"missing: tip \(radius of a sphere must be"),
-        ('"turn" type="fixed"', '"turn" type="revolut"', "type of joint turn must be one of revolute, .*got 'revolut'"),
-        ('"turn" type="fixed"', '"turn"', "type of joint turn must be one of revolute, .*got None"),
+        (BASE, "", "each collision of a link must have 1 shape, got 0"),
+        (BASE, '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
+        (BASE, '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
+        ('radius="0.01"', 'radius="big"', "not a readable URDF file"),
+        ('radius="0.01"', 'radius="-1"', r"tip \(radius of a sphere must be"),
+        ('"turn" type="revolute"', '"turn" type="revolut"', "type of joint turn must be one of revolute, .*got 'revolut'"),
+        ('"turn" type="revolute"', '"turn"', "type of joint turn must be one of revolute, .*got None"),
         ("robot", "robots", "it holds <robots>, not <robot>"),
     ],
 )  # fmt: skip

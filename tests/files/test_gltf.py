@@ -49,9 +49,10 @@ class Gltf:
         self.data["nodes"].append(node)
         return len(self.data["nodes"]) - 1
 
-    def write(self, path):
+    def write(self, path, uri=None):
         text = base64.b64encode(self.binary).decode()
-        self.data["buffers"] = [{"byteLength": len(self.binary), "uri": f"data:application/octet-stream;base64,{text}"}]
+        uri = uri or f"data:application/octet-stream;base64,{text}"
+        self.data["buffers"] = [{"byteLength": len(self.binary), "uri": uri}]
         path.write_text(json.dumps(self.data))
         return path
 

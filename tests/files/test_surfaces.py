@@ -115,15 +115,6 @@ def test_corners_beside_a_surface_add_to_the_errors_of_its_triangles():
             assert off.min() >= 0.01
 
 
-def test_what_is_only_nearly_a_sphere_is_none():
-    round_, egg = (first_solid(as_splines(ball(5))) for _ in range(2))
-    for solid, bump in ((round_, 0.0), (egg, 1e-5)):
-        surface = next(explore(solid, "FACE"))
-        spline = faces.occ.BRep_Tool.Surface_s(surface)
-        spline.SetPole(3, 2, spline.Pole(3, 2).Translated(faces.occ.gp_Vec(0, 0, bump)))
-        assert faces.surfaces(to_bytes(solid)).kind.tolist() == [OTHER if bump else SPHERE]
-
-
 @pytest.mark.parametrize("splines", [False, True])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_no_triangle_is_further_from_its_face_than_its_error(name, splines):
