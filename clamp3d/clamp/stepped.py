@@ -75,7 +75,7 @@ def solve_stepped(
         ("step", step, start, "mm"),
         ("tilt step", math.degrees(tilt_step), math.degrees(section.clamp.tilt_stop), "deg"),
     ):
-        if not (math.isfinite(value) and value > 0.0):
+        if not value > 0.0:
             raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
         if not value * _MOVES >= reach:
             raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")

@@ -12,7 +12,7 @@ from clamp3d.baselines import Cas, Chords
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.assemblies.minima import minima
-from clamp3d.clamp.assemble import STEP, TILT_STEP
+from clamp3d.clamp.assemble import TILT_STEP
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
@@ -146,14 +146,6 @@ def test_a_start_that_overlaps_is_refused(clamp):
     section = Section(clamp, Cas())
     with pytest.raises(InputError, match=r"P. and P. overlap by \d+\.\d+ mm"):
         solve_final_state(section, section.open_state(0.0))
-
-
-def test_steps_must_be_positive(clamp):
-    section = Section(clamp, Cas())
-    with pytest.raises(InputError, match="step must be > 0 mm, got 0"):
-        solve_stepped(section, step=0.0, tilt_step=TILT_STEP)
-    with pytest.raises(InputError, match="tilt step must be > 0 deg, got nan"):
-        solve_stepped(section, step=STEP, tilt_step=math.nan)
 
 
 def test_a_loose_wire_in_a_sliver_is_put_down_without_overlap():

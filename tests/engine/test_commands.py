@@ -76,26 +76,3 @@ def test_check_of_some_pairs_is_clean(main):
     assert code == 0, err
     assert "2 pairs" in out
     assert "1 contact, 1 clear" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["check", "none.toml"], "none.toml: no such file"),
-        (["check", HINGE, "--line", "LJ-500"], "line goes with a clamp"),
-        (["check", HINGE, "--pairs", "leaf-a"], "must read like P1:P6,P2:P7, got 'leaf-a'"),
-        (["check", HINGE, "--pairs", "leaf-a:leg"], "unknown part 'leg'; available: leaf-a"),
-        (["check", HINGE, "--clearance", "-1"], "clearance must be 0 or > contact"),
-        (["sweep", "--yaw-deg", "95"], "yaw must be > 0 and < 90 deg, got 95 deg"),
-        (["sweep", "--pitch-deg", "0"], "pitch must be > 0 and < 90 deg, got 0 deg"),
-        (["sweep", "--map", "map.bmp"], "the name must end in one of .png, .svg, .pdf"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_2(arguments, message, tmp_path, main, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = main(*arguments)
-    assert code == 2
-    assert message in err
-    assert err.count("\n") == 1
-    assert "Traceback" not in err
-    assert list(tmp_path.iterdir()) == []

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import Scene, check, export, load, shapes
+from clamp3d import Scene, check, export, shapes
 from clamp3d.clamp.dimensions import PARTS, TITLES
 from clamp3d.clamp.parts import parts
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.kernel import rotation, translation
+from clamp3d.kernel import translation
 from clamp3d.output.palette import PART_COLOURS
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
@@ -82,16 +82,3 @@ def test_clashes_are_bodies_of_their_own(tmp_path, suffix):
     assert volumes.keys() == {"a", "b", "pin", *common}
     for name, volume in common.items():
         assert volumes[name] == pytest.approx(volume, rel=tolerance)
-
-
-def test_step_is_read_as_it_was_written(tmp_path):
-    """A pin 0.5 mm over a drilled box, in a tube that is 1 mm wider; nothing is square to the axes."""
-    skew = translation(3.0, 4.0, -5.0) @ rotation((1.0, 2.0, 3.0), 0.7)
-    scene = Scene().add("box", shapes.box((12.0, 10.0, 8.0), holes=[shapes.Hole(2.0, (1.0, 0.5))]), skew)
-    scene = scene.add("pin", shapes.cylinder(3.0, 20.0), skew @ translation(0, 0, 14.5))
-    scene = scene.add("tube", shapes.cylinder(6.0, 10.0, bore=4.0), skew @ translation(0, 0, 15.5))
-    result = check(load(export(scene, tmp_path / "three.step").files[0]), distances=True)
-    gaps = {(row.a, row.b): row.distance for row in result.pairs}
-    for pair, truth in ((("box", "pin"), 0.5), (("pin", "tube"), 1.0)):
-        assert gaps[pair].lower - 1e-6 <= truth <= gaps[pair].upper + 1e-6
-        assert gaps[pair].upper - gaps[pair].lower < 0.01
