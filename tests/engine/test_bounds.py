@@ -19,7 +19,7 @@ from tests.kinds import BLOCK, DRAWN, faceted_shape, mesh_shape, poses
 SLOW = settings(
     deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate], suppress_health_check=[HealthCheck.too_slow]
 )
-SOME = st.sampled_from(DRAWN)
+SOME = st.sampled_from([*DRAWN, *(faceted_shape(shape, 0.5) for shape in DRAWN)])
 BARE = st.tuples(
     st.builds(SweptArc, st.floats(3.0, 15.0), st.floats(0.2, 3.0), st.floats(2.0, 60.0)),
     st.builds(Cylinder, st.floats(0.5, 12.0), st.floats(1.0, 90.0)),
@@ -27,9 +27,9 @@ BARE = st.tuples(
 ROUND = [shape for shape in DRAWN if any(e.profile.arcs for e in (*shape.bodies, *shape.holes))]
 
 
-@settings(SLOW, max_examples=12)
-@given(st.tuples(SOME, SOME) | BARE, poses(25.0))
-def test_any_pair_of_drawn_solids(pair, T):
+@settings(SLOW, max_examples=30)
+@given(st.tuples(SOME, SOME) | BARE, poses(9.0) | poses(25.0))
+def test_any_pair_of_solids_drawn_or_faceted(pair, T):
     a, b = pair
     assert_distance(distance(a, b, T), a, b, T)
     assert_distance(distance(b, a, inverse(T)), b, a, inverse(T))

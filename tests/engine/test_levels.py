@@ -302,27 +302,6 @@ def test_a_cylinder_on_facets(i, radius, length, T):
         assert body(rod).field(to_target(inverse(T), found.point_a[None]))[0] <= found.upper + 1e-6
 
 
-# --- Depth ------------------------------------------------------------------------------------------------------------
-
-
-@settings(QUICK, max_examples=12)
-@given(SOME, SOME, poses(9.0))
-def test_the_verified_translation_parts_the_bodies(i, j, T):
-    """By manifold3d: moved by the depth's upper bound the meshes share nothing; less than its lower one, they do."""
-    a, b = FACETED[i], FACETED[j]
-    found = distance(a, b, T)
-    if found.upper > -1e-3:
-        return
-    one, two = surface(a).manifold, surface(b).manifold.transform(np.ascontiguousarray(T[:3]))
-    if math.isfinite(found.lower):
-        assert np.linalg.norm(found.normal) == pytest.approx(1.0, abs=1e-9)
-        out = two.translate(tuple(-found.lower * found.normal))
-        assert (one ^ out).volume() <= 1e-5
-    for way in np.random.default_rng(0).normal(size=(25, 3)):
-        near = two.translate(tuple(0.98 * -found.upper * way / np.linalg.norm(way)))
-        assert (one ^ near).volume() > 0.0
-
-
 # --- Many poses -------------------------------------------------------------------------------------------------------
 
 GROOVES = [SweptArc(12.0, 1.2, 50.0), SweptArc(7.0, 1.05, 9.0), SweptArc(7.0, 2.1, 30.0)]

@@ -30,12 +30,13 @@ def bounds_about(groove, rod, ez, angle, half):
     return mixture, stretch, rates
 
 
-def _beside(P, r, l, c, d):  # noqa: E741
-    """Signed distance of points (n, 3) from a cylinder about c along d."""
-    m = P - c
+def _beside(angle, z, r, l, c, d):  # noqa: E741
+    """Of points at ``angle`` of an arc of radius 12: the signed distance from a cylinder, from its side, its ends."""
+    m = np.column_stack([12.0 * np.sin(angle), -12.0 * np.cos(angle), 0.0 * angle + z]) - c
     t = m @ d
     g, e = np.linalg.norm(m - t[:, None] * d, axis=1) - r, np.abs(t) - l
-    return np.where(np.maximum(g, e) > 0.0, np.hypot(np.maximum(g, 0.0), np.maximum(e, 0.0)), np.maximum(g, e))
+    f = np.where(np.maximum(g, e) > 0.0, np.hypot(np.maximum(g, 0.0), np.maximum(e, 0.0)), np.maximum(g, e))
+    return f, g, e
 
 
 def _cylinders(rng, count):
@@ -61,8 +62,7 @@ def test_an_end_arc_has_no_nearer_point():
         half_angle, ez = rng.uniform(0.2, 3.1), rng.choice([0.0, 5.0, 25.0])
 
         def at(angle, ez=ez, r=r, l=l, c=c, d=d):  # noqa: E741
-            angle = np.atleast_1d(angle)
-            return _beside(np.column_stack([12.0 * np.sin(angle), -12.0 * np.cos(angle), 0.0 * angle + ez]), r, l, c, d)
+            return _beside(np.atleast_1d(angle), ez, r, l, c, d)[0]
 
         groove, rod = Groove(12.0, half_angle, 0.0, 0.0, 0.0), _rod(r, l, c, d)
         angle = np.linspace(-half_angle, half_angle, 4001)
@@ -86,11 +86,7 @@ def test_on_a_stretch_of_an_arc_nothing_is_outside_its_bounds():
         angle, half = rng.uniform(-3.0, 3.0), 10.0 ** rng.uniform(-3.0, 0.0)
         rod, groove = _rod(r, l, c, d), Groove(12.0, 3.1, 0.0, 0.0, 0.0)
         mixture, stretch, rates = bounds_about(groove, rod, 5.0, angle, half)
-        q = angle + np.linspace(-half, half, 301)
-        m = np.column_stack([12.0 * np.sin(q), -12.0 * np.cos(q), 0.0 * q + 5.0]) - c
-        t = m @ d
-        g, e = np.linalg.norm(m - t[:, None] * d, axis=1) - r, np.abs(t) - l
-        f = np.where(np.maximum(g, e) > 0.0, np.hypot(np.maximum(g, 0.0), np.maximum(e, 0.0)), np.maximum(g, e))
+        f, g, e = _beside(angle + np.linspace(-half, half, 301), 5.0, r, l, c, d)
         assert mixture <= f.min() + 1e-12
         assert stretch.g_low - 1e-12 <= g.min() <= g.max() <= stretch.g_high + 1e-12
         assert stretch.e_low - 1e-12 <= e.min() <= e.max() <= stretch.e_high + 1e-12
