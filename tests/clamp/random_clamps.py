@@ -1,7 +1,7 @@
 """Random clamps of all dimensions, closed by every command and judged by means that know nothing of the solver."""
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -36,6 +36,16 @@ class Score:
         self.worst[what] = max(self.worst.get(what, 0.0), error)
         if not error <= allowed:
             self.findings.append((k, f"{what}: {error:.3g}"))
+
+
+def changed(thing, values):
+    """The thing with other values at dotted names, all at once."""
+    inner = defaultdict(dict)
+    for path, value in values.items():
+        name, _, rest = path.partition(".")
+        inner[name][rest] = value
+    made = {key: own[""] if "" in own else changed(getattr(thing, key), own) for key, own in inner.items()}
+    return replace(thing, **made)
 
 
 def whole_clamp(rng, *, major=0.25):

@@ -8,12 +8,12 @@ from shapely import LineString
 
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
-from clamp3d.clamp.dimensions import Joints
+from clamp3d.clamp.dimensions import GrooveDimensions, Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import EDGES, D, Section, U, W
 from tests.clamp.outlines import Outlines
-from tests.clamp.random_clamps import check_clamps, whole_clamp
+from tests.clamp.random_clamps import changed, check_clamps, whole_clamp
 
 
 def test_an_optimiser_and_a_grid_agree():
@@ -101,10 +101,8 @@ def test_forces_on_each_wire_and_on_the_down_splint_balance(run):
 def test_a_wire_beyond_the_mouth_can_rest_between_face_and_groove():
     """Small up groove, set 10 mm aside: the mouth is no wall."""
     base = load_clamp(line=16, jumper=16)
-    up = base.up_splint
-    small = replace(up.line_groove, radius=9.0, offset=56.0, centre_depth=up.thickness + 5.0)
-    clamp = replace(base, up_splint=replace(up, line_groove=small))
-    section = Section(clamp, Cas())
+    small = GrooveDimensions(radius=9.0, offset=56.0, centre_depth=base.up_splint.thickness + 5.0)
+    section = Section(changed(base, {"up_splint.line_groove": small}), Cas())
     beyond = [s for s in equilibria(section) if not section.mouth("P6")[0] <= s.q[0] <= section.mouth("P6")[1]]
     assert beyond
     for state in beyond:

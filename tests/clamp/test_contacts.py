@@ -16,6 +16,7 @@ from clamp3d.clamp.parts import parts
 from clamp3d.clamp.surfaces import surfaces_at
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.geometry.profile import Arc
+from tests.clamp.random_clamps import changed
 
 WIRES = [("LJ-630", "LJ-120"), ("LJ-16", "LJ-16"), (46.0, 14.0)]
 
@@ -76,18 +77,11 @@ def test_every_difference_from_the_declared_matrix_is_named():
 def against_the_bolt():
     """Thick wires on narrow grooves near the bolt: in their middle they would reach 6 mm into its shank."""
     clamp = load_clamp(line=52, jumper=52)
-
-    def grooves(depth):
+    values = {"down_splint.slot_width": 30.0, "down_splint.max_tilt_deg": 5.0, "bolt.shank_length": 220.0}
+    for splint, depth in (("up", clamp.up_splint.thickness + 5.0), ("down", clamp.down_splint.face_depth - 5.0)):
         groove = GrooveDimensions(radius=15.0, offset=30.0, centre_depth=depth)
-        return {"line_groove": groove, "jumper_groove": groove}
-
-    up, down = clamp.up_splint, clamp.down_splint
-    return replace(
-        clamp,
-        up_splint=replace(up, **grooves(up.thickness + 5.0)),
-        down_splint=replace(down, **grooves(down.face_depth - 5.0), slot_width=30.0, max_tilt_deg=5.0),
-        bolt=replace(clamp.bolt, shank_length=220.0),
-    )
+        values |= dict.fromkeys((f"{splint}_splint.line_groove", f"{splint}_splint.jumper_groove"), groove)
+    return changed(clamp, values)
 
 
 def test_the_bolt_stops_wires_and_is_named():

@@ -8,7 +8,7 @@ import pytest
 
 from clamp3d import InputError, load_clamp
 from clamp3d.clamp.dimensions import Wire
-from tests.clamp.random_clamps import whole_clamp
+from tests.clamp.random_clamps import changed, whole_clamp
 
 
 def test_wrong_values_in_python_are_one_line_too():
@@ -19,12 +19,6 @@ def test_wrong_values_in_python_are_one_line_too():
     wide = r"^Clamp: line: the diameter must be less than twice up_splint\.width = 137 mm, got 300; are both in mm\?$"
     with pytest.raises(InputError, match=wide):
         replace(load_clamp(), line=Wire(diameter=300.0))
-
-
-def _changed(thing, path, value):
-    """The thing with the value at a dotted path replaced."""
-    name, _, rest = path.partition(".")
-    return replace(thing, **{name: _changed(getattr(thing, name), rest, value) if rest else value})
 
 
 def _half_mouth(radius, into):
@@ -75,7 +69,7 @@ def test_each_rule_holds_up_to_its_limit_and_no_further(path, limit, side, messa
 
     def complaint(value):
         try:
-            _changed(clamp, path, value)
+            changed(clamp, {path: value})
         except InputError as error:
             return str(error)
         return ""

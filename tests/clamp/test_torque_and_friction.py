@@ -20,6 +20,7 @@ from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.torque import tighten, torque_per_newton
 from clamp3d.output.forces_report import measured_to_text
+from tests.clamp.random_clamps import changed
 
 REFERENCE = load_clamp()
 
@@ -43,9 +44,8 @@ def test_torque_equation_by_hand(friction, lever):
 
 def test_torque_equation_with_other_dimensions():
     # M16 x 2, hole 17.5, across flats 24, friction 0.12: 0.32 + 0.58 * 14.700962 * 0.12 + 10.375 * 0.12
-    bolt, nut = replace(REFERENCE.bolt, diameter=16.0, pitch=2.0), replace(REFERENCE.nut, across_flats=24.0)
-    clamp = replace(REFERENCE, bolt=bolt, nut=nut, up_splint=replace(REFERENCE.up_splint, hole_diameter=17.5))
-    assert torque_per_newton(clamp, 0.12) == pytest.approx(2.588187, abs=1e-6)
+    m16 = {"bolt.diameter": 16.0, "bolt.pitch": 2.0, "nut.across_flats": 24.0, "up_splint.hole_diameter": 17.5}
+    assert torque_per_newton(changed(REFERENCE, m16), 0.12) == pytest.approx(2.588187, abs=1e-6)
 
 
 def test_loads_and_slip_by_hand(run):
@@ -210,11 +210,8 @@ def test_symmetric_clamp_in_closed_form():
     """With both sides alike the greatest distance is at no tilt: both wires at the edge of their cones at once."""
     up, down = REFERENCE.up_splint, REFERENCE.down_splint
     groove, low = up.line_groove, down.line_groove
-    clamp = replace(
-        load_clamp(line=32.67, jumper=32.67),
-        up_splint=replace(up, jumper_groove=groove),
-        down_splint=replace(down, jumper_groove=low),
-    )
+    alike = {"up_splint.jumper_groove": groove, "down_splint.jumper_groove": low}
+    clamp = changed(load_clamp(line=32.67, jumper=32.67), alike)
     slack, friction = groove.radius - 16.335, 0.15
     finder = FrictionBand(clamp)
     d = groove.centre_depth - low.centre_depth - 2.0 * slack / math.hypot(1.0, friction)
