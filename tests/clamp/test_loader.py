@@ -23,7 +23,6 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ("radius = 23.8012", "radius = nan", "up_splint.line_groove.radius: must be a finite number"),
         ("radius = 23.8012", "radius = true", "up_splint.line_groove.radius: must be a valid number, got True"),
         ("offset = 46.0349", "offset = 60.0", "the arc leaves the splint at its edge: offset must be <= 57.4"),
-        ("max_tilt_deg = 12.8", "max_tilt_deg = 13.0", "must be <= 12.99, where the saddle's edge stops the tilt"),
         ('conductor = "LJ-630"', 'conductor = "LJ-631"', "line.conductor: unknown conductor 'LJ-631'; nearest: LJ-630"),
         ('conductor = "LJ-630"', "", "line.conductor or diameter: give one of them"),
         ("P4 = 2, P5", "P4 = 4, P5", "connections.P1.P4: must be 0, 1, 2 or 3, got 4"),

@@ -16,6 +16,7 @@ from clamp3d.engine.open_mesh import _crossing
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.pose import translation
+from tests.kinds import mesh_shape
 
 
 def opened(mesh, *faces):
@@ -23,11 +24,20 @@ def opened(mesh, *faces):
 
 
 BOX = trimesh.creation.box((10.0, 10.0, 10.0))
-CUP = opened(BOX, 0)
+CUP, ROD = opened(BOX, 0), shapes.cylinder(2, 4)
 
 
 def row(a, b, T, **scene):
     return check(Scene(**scene).add("a", a).add("b", b, T), distances=True).pairs[0]
+
+
+@pytest.mark.parametrize("other", [shapes.box(4, 4, 4), mesh_shape(trimesh.creation.box((4, 4, 4))), ROD])
+def test_of_an_open_mesh_distances_are_certain_and_its_inside_is_not_known(other):
+    beside = row(CUP, other, translation(8, 0.5, 0.3), clearance=2.0)
+    assert beside.verdict.value == "clearance"
+    assert beside.distance.lower - 1e-9 <= 1.0 <= beside.distance.upper + 1e-9
+    assert row(CUP, other, translation(5, 0.5, 0.3)).verdict.value in ("clash", "uncertain")
+    assert row(CUP, other, np.eye(4)).verdict.value == "uncertain"
 
 
 def test_what_a_closed_part_holds_overlaps_it_however_open():

@@ -78,13 +78,6 @@ def test_verdicts_in_a_crowd_are_those_of_measured_distances(pack):
     assert sum(result.work.queries.values()) < sum(full.work.queries.values()) / 4
 
 
-def test_many_parts_ask_of_near_pairs_alone(pack):
-    result = check(pack(400))
-    assert sum(result.counts.values()) == 400 * 399 // 2
-    assert result.work.candidates < 800
-    assert sum(result.work.queries.values()) < 20 * result.work.candidates
-
-
 def test_broad_phase_against_brute_force():
     rng = np.random.default_rng(0)
     n = 200

@@ -6,6 +6,7 @@ import pytest
 from clamp3d import assemble, load_clamp
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.scene import clamp_scene
+from clamp3d.kernel import rotation, translation
 from clamp3d.output.report import make_report
 from clamp3d.output.report_page import report_html
 
@@ -21,10 +22,7 @@ def odd_poses():
     generator = np.random.default_rng(7)
     poses = {}
     for name in PARTS:
-        Q, _ = np.linalg.qr(generator.normal(size=(3, 3)))
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = Q * np.linalg.det(Q), generator.normal(size=3) * 200
-        poses[name] = T
+        poses[name] = translation(*(200.0 * generator.normal(size=3))) @ rotation(generator.normal(size=3), 2.0)
     return poses
 
 

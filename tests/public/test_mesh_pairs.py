@@ -1,4 +1,4 @@
-"""Meshes made by trimesh against manifold3d, and what is certain of open ones."""
+"""Meshes made by trimesh against manifold3d."""
 
 import itertools
 
@@ -9,7 +9,6 @@ import trimesh
 
 from clamp3d import Scene, check, distance, load
 from clamp3d.kernel import rotation, translation
-from clamp3d.shapes import MeshShape, box, cylinder, make_mesh
 from tests.kinds import mesh_shape
 
 SKEW = rotation((1.0, 2.0, 3.0), 0.7)
@@ -59,20 +58,6 @@ def test_one_mesh_twice_is_an_overlap(name, offset):
     shape = mesh_shape(MADE[name])
     scene = Scene().add("a", shape, SKEW).add("b", shape, translation(offset, 0, 0) @ SKEW)
     assert check(scene).verdict("a", "b").value in ("duplicate", "contained", "clash")
-
-
-def opened(mesh):
-    return MeshShape(make_mesh(mesh.vertices, np.delete(mesh.faces, 0, axis=0)), "off")
-
-
-@pytest.mark.parametrize("other", [box((4, 4, 4)), mesh_shape(trimesh.creation.box((4, 4, 4))), cylinder(2, 4)])
-def test_of_an_open_mesh_distances_are_certain_and_its_inside_is_not_known(other):
-    scene = Scene(clearance=2.0).add("open", opened(trimesh.creation.box((10, 10, 10))))
-    row = check(scene.add("b", other, translation(8, 0.5, 0.3)), distances=True).pairs[0]
-    assert row.verdict.value == "clearance"
-    assert row.distance.lower - 1e-9 <= 1.0 <= row.distance.upper + 1e-9
-    assert check(scene.add("b", other, translation(5, 0.5, 0.3))).pairs[0].verdict.value in ("clash", "uncertain")
-    assert check(scene.add("b", other)).pairs[0].verdict.value == "uncertain"
 
 
 def test_a_stated_chord_widens_the_bounds(tmp_path):

@@ -6,7 +6,6 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError, check, load
-from clamp3d.geometry.shapes import MeshShape
 from clamp3d.scenefile import tables
 from clamp3d.scenefile.parts import read_parts
 
@@ -68,9 +67,6 @@ def test_files_whose_names_no_part_can_have(folder):
 def test_no_chord_error_is_so_large_that_bounds_overflow(folder, chord):
     with pytest.raises(InputError, match="chord must be >= 0 and < 100000 mm"):
         load(folder, chord=chord)
-    mesh = load(folder).parts[0].shape.mesh
-    with pytest.raises(InputError, match="error of a mesh must be >= 0 and < 100000 mm"):
-        MeshShape(mesh, "off", error=chord)
 
 
 def test_two_files_of_one_name_are_refused_by_name(folder):
