@@ -37,23 +37,6 @@ def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(line, j
             assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
 
 
-def test_reference_differs_from_its_matrix_where_the_bolt_has_play(run):
-    assert [(d.a, d.b, d.declared, d.measured) for d in run.matrix_differences] == [
-        ("P1", "P4", 2, 0),
-        ("P2", "P4", 2, 0),
-    ]
-    assert "P1-P4 (up splint, bolt) declared 2 (convex object collision) but does not touch: 1.000 mm apart" in str(
-        run.matrix_differences[0]
-    )
-    assert {pair: c.type for pair, c in run.matrix.items()} == {
-        ("P1", "P5"): 2, ("P1", "P6"): 3, ("P1", "P7"): 3, ("P2", "P3"): 3,
-        ("P2", "P6"): 3, ("P2", "P7"): 3, ("P3", "P4"): 2, ("P4", "P5"): 1,
-    }  # fmt: skip
-    found = {(c.a, c.b): c for c in run.contacts}
-    for pair in (("P1", "P4"), ("P2", "P4")):
-        assert (found[pair].relation, found[pair].feature) == ("none", "hole")
-
-
 def test_every_difference_from_the_declared_matrix_is_named():
     clamp = load_clamp()
     wrong = {"P1": {"P3": 2}, "P2": {"P5": 2, "P7": 2}, "P3": {"P4": 0}}
@@ -63,7 +46,8 @@ def test_every_difference_from_the_declared_matrix_is_named():
     assert {pair: (d.declared, d.measured) for pair, d in found.items()} == {
         "P1-P3": (2, 0), "P1-P4": (2, 0), "P2-P4": (2, 0), "P2-P5": (2, 0), "P2-P7": (2, 3), "P3-P4": (0, 2),
     }  # fmt: skip
-    assert "does not touch: 36.085 mm apart" in str(found["P1-P3"])
+    said = "P1-P3 (up splint, saddle washer) declared 2 (convex object collision) but does not touch: 36.085 mm apart"
+    assert said in str(found["P1-P3"])
     assert "does not touch: 41.490 mm apart" in str(found["P2-P5"])
     assert assembly.clamped
     (undeclared,) = assembly.undeclared

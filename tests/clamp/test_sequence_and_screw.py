@@ -92,10 +92,3 @@ def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking, run):
     gaps = {(c.a, c.b): c.gap for c in made.contacts}
     assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - clamp.nut.height), abs=1e-6)
     assert np.isfinite(list(gaps.values())).all()
-
-
-def test_scenes_are_the_parts_at_their_poses(run):
-    for waypoint in (run.path[0], run.path[-1]):
-        placed = {part.name: part.T_world.tolist() for part in run.scene_at(waypoint).parts}
-        assert placed == {f"P{k}": waypoint.T_world(f"P{k}").tolist() for k in range(1, 8)}
-    assert all(np.array_equal(part.T_world, run.T_world(part.name)) for part in run.scene.parts)
