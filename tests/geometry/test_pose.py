@@ -5,13 +5,9 @@ import warnings
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
-from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError
-from clamp3d.geometry.pose import PoseWarning, check_pose, check_pose_array, inverse, nearest_rigid, turn_of
+from clamp3d.geometry.pose import PoseWarning, check_pose, check_pose_array, inverse, nearest_rigid
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, rotation, translation
 from clamp3d.kernel.distance import signed_distance, signed_distances
 from clamp3d.kernel.pieces import groove_pieces
@@ -110,11 +106,6 @@ def test_what_is_worse_than_rounding_is_refused(bad, rule):
         check_pose_array(np.array([np.eye(4), bad, bad]))
     with pytest.raises(InputError, match=rule):
         signed_distance(GROOVE, WIRE, bad)
-
-
-@given(hnp.arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: np.abs(q).max() > 0.1))
-def test_turns_of_quaternions_are_scipys(q):
-    np.testing.assert_allclose(turn_of(*q.tolist()), Rotation.from_quat(q).as_matrix(), atol=1e-15)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

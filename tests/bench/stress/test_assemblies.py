@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d.baselines import Cas
-from clamp3d.bench.stress.assemblies.clamps import clamp_of, random_clamp
+from clamp3d.bench.stress.assemblies.clamps import clamp_of
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
-from clamp3d.clamp.section import Section
 
 CLAMPS = 2
 
@@ -57,23 +55,6 @@ def test_falls_is_the_way_down_to_the_closed_form(lift):
     assert envelope.overlap(q) == pytest.approx(0.0, abs=1e-12)
     q[4] -= 2.0 * lift
     assert envelope.overlap(q) == pytest.approx(lift, abs=1e-12)
-
-
-def test_envelopes_of_a_wire_against_the_distance_to_the_groove():
-    """A centre on the envelope touches, by the signed distance in 3D; one beyond it overlaps."""
-    rng = np.random.default_rng(4)
-    for _ in range(20):
-        clamp = random_clamp(rng)
-        section, tilt = Section(clamp, Cas()), np.array([rng.uniform(-0.2, 0.2)])
-        for i, (name, wire) in enumerate(zip(("P6", "P7"), Envelope(clamp).wires, strict=True)):
-            x = np.array([[rng.uniform(*sorted((wire.inner, wire.edge)))]])
-            over, under = float(wire.over(x)[0, 0]), float(wire.under(x, tilt)[0, 0])
-            q = np.array([1e3, 1e3, 1e3, 1e3, over - under, section.lever * tilt[0], *[0.0] * 4])
-            q[2 * i : 2 * i + 2] = x[0, 0], over
-            gaps = section.wire_gaps(q, name)
-            for splint in ("P1", "P2") if math.isfinite(over - under) else ():
-                least = min(v for v, pair in zip(gaps.value, gaps.pair, strict=True) if pair[0] == splint)
-                assert least == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_papers_search_stops_a_step_short():
