@@ -80,7 +80,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
         (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
         (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
-        (["view", "--url", "localhost:6000"], "zmq_url"),
+        (["view", "--url", "http://127.0.0.1:7000/static/"], "(tcp://HOST:PORT), got 'http://127.0.0.1:7000/static/'"),
         (["view", "--url", "tcp://127.0.0.1:1", "--port", "7000"], "--port and --timeout"),
         (["view", "--html", "x.html", "--open"], "--open"),
         (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
