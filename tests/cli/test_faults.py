@@ -117,7 +117,7 @@ class TestEnd:
         with subprocess.Popen(
             [*COMMAND, "run", "-q", "--method", "hulls"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env
         ) as process:
-            _until(lambda: _children(process.pid))
+            until(lambda: _children(process.pid))
             workers = _children(process.pid)
             process.send_signal(signal.SIGTERM)
             out, err = process.communicate(timeout=60)
@@ -125,10 +125,10 @@ class TestEnd:
         said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
         assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
         assert list(temporary.iterdir()) == []
-        _until(lambda: not any(_alive(worker) for worker in workers))
+        until(lambda: not any(alive(worker) for worker in workers))
 
 
-def _until(condition):
+def until(condition):
     for _ in range(1200):
         if condition():
             return
@@ -141,7 +141,7 @@ def _children(pid):
     return [int(line) for line in found.stdout.split()]
 
 
-def _alive(pid):
+def alive(pid):
     found = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True, check=False)
     return found.stdout.strip() not in ("", "Z", "Zs")
 

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -11,6 +10,7 @@ from clamp3d import InputError
 from clamp3d.errors import SolverError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 from clamp3d.files.worker import process
+from tests.cli.test_faults import alive, until
 
 STAND_IN = """
 import os
@@ -120,11 +120,4 @@ print(worker.call("os:getpid", time_limit=60.0), flush=True)
 def test_it_ends_with_its_caller(start):
     code = f"import os, signal\n{start}\nos.kill(os.getpid(), signal.SIGKILL)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
-    child = int(run.stdout)
-    for _ in range(600):
-        try:
-            os.kill(child, 0)
-        except ProcessLookupError:
-            return
-        time.sleep(0.1)
-    pytest.fail("the process outlives its caller by a minute")
+    until(lambda: not alive(int(run.stdout)))
