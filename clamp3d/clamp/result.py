@@ -9,10 +9,10 @@ from typing import Any, Literal, get_args
 from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
-from clamp3d.clamp.contact import Contact, overlap
+from clamp3d.clamp.contact import Contact, measure_contacts, overlap
 from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.forces import Force
-from clamp3d.clamp.matrix import Difference, plain
+from clamp3d.clamp.matrix import Difference, Pair, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.engine.scene import Scene
@@ -256,6 +256,16 @@ class Assembly:
         """The parts at a waypoint of `path` as a scene."""
         instance("waypoint", waypoint, Waypoint)
         return clamp_scene(self.clamp, {part: waypoint.T_world(part) for part in waypoint.poses})
+
+    def contacts_at(self, waypoint: Waypoint) -> tuple[Contact, ...]:
+        """How all 21 pairs stand at a waypoint of `path`."""
+        instance("waypoint", waypoint, Waypoint)
+        return measure_contacts(self.clamp, waypoint.poses, self.model)
+
+    @property
+    def matrix(self) -> dict[Pair, Contact]:
+        """The connection matrix as measured: the pairs that touch in the final state, with type and place."""
+        return {(c.a, c.b): c for c in self.contacts if c.type}
 
     @property
     def matrix_differences(self) -> tuple[Difference, ...]:

@@ -37,6 +37,14 @@ def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(line, j
             assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
 
 
+def test_the_last_waypoint_has_the_contacts_of_the_final_state(run):
+    assert {(c.a, c.b): c.gap for c in run.contacts_at(run.path[-1])} == {(c.a, c.b): c.gap for c in run.contacts}
+    assert {pair: c.type for pair, c in run.matrix.items()} == {
+        ("P1", "P5"): 2, ("P1", "P6"): 3, ("P1", "P7"): 3, ("P2", "P3"): 3,
+        ("P2", "P6"): 3, ("P2", "P7"): 3, ("P3", "P4"): 2, ("P4", "P5"): 1,
+    }  # fmt: skip
+
+
 def test_every_difference_from_the_declared_matrix_is_named():
     clamp = load_clamp()
     wrong = {"P1": {"P3": 2}, "P2": {"P5": 2, "P7": 2}, "P3": {"P4": 0}}
