@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 
 from clamp3d.engine.answer import Distances
 from clamp3d.engine.closed_form import Bore, ClosedForm
-from clamp3d.engine.convex import Rod
+from clamp3d.engine.convex import Convex, Rod
 from clamp3d.engine.hull import MEMBER
 from clamp3d.engine.model import Model
 from clamp3d.geometry.pose import Array, inverse, to_target
 from clamp3d.geometry.primitives import Cylinder
 from clamp3d.kernel.distance import signed_distances
+
+_SHARES = (0.0, 0.6, 0.98)
+"""How far out points of a piece are tried, from its middle to its surface."""
+_IN_A_ROD = (np.linspace(-0.49, 0.49, 7), np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False), np.array(_SHARES))
+"""Where along a cylinder, in lengths, at which angles, and how far out points are tried."""
+_BLOCK = 2000
+"""Poses whose points are measured at a time: with hundreds of points each they fill some 10 MB."""
+_CORNERS = 32
+"""Corners of a polyhedron that points are tried towards, about."""
 
 
 def bounds_at_poses(a: Model, b: Model, T: Array) -> Distances:
@@ -35,6 +45,47 @@ def bounds_at_poses(a: Model, b: Model, T: Array) -> Distances:
         back = inverse(T)
         answers += [_seen_from_first(_bore_rod(bore, rod, second, first, back), T) for bore, rod in turned]
     return replace(_nearest(answers), lower=np.max([answer.lower for answer in answers], axis=0))
+
+
+def overlaps_at_poses(a: Model, b: Model, T: Array) -> Array:
+    """Upper bounds (n,) of the signed distances of ``b`` at ``T`` (n, 4, 4) in a's frame, from points in both bodies.
+
+    Points in either body are tried; infinite is the bound where none of them lies in the other too, and of bodies that
+    are only enclosed by a closed form.
+    """
+    upper = np.full(len(T), np.inf)
+    for first, second, places in ((a, b, T), (b, a, inverse(T))):
+        for form, other in itertools.product(second.bodies or (), first.bodies or ()):
+            if form.surface is None and other.surface is None:
+                upper = np.minimum(upper, -_attested(form, other, places))
+    return upper
+
+
+def _attested(form: ClosedForm, other: ClosedForm, T: Array) -> Array:
+    """The greatest depth (n,) of the tried points of a body, at ``T`` (n, 4, 4) in the other's frame, in either body.
+
+    Minus infinity where none of them is in both.
+    """
+    points = np.vstack([_points_in(piece) for piece in form.outers])
+    own = form.depth(points) - form.error
+    points, own = points[own > 0.0], own[own > 0.0]
+    best = np.full(len(T), -np.inf)
+    for rows in np.array_split(np.arange(len(T)), 1 + len(T) // _BLOCK):
+        moved = np.einsum("nij,kj->nki", T[rows, :3, :3], points) + T[rows, None, :3, 3]
+        depth = other.depth(moved.reshape(-1, 3)).reshape(moved.shape[:2]) - other.error
+        best[rows] = np.where(depth > 0.0, np.maximum(depth, own), -np.inf).max(axis=1, initial=-np.inf)
+    return best
+
+
+def _points_in(piece: Convex) -> Array:
+    """Points (k, 3) in a piece: in the middle, and just under the side, the ends or the corners."""
+    if isinstance(piece, Rod):
+        z, angle, share = (x.ravel() for x in np.meshgrid(*_IN_A_ROD))
+        across = share * piece.radius
+        return to_target(piece.T, np.column_stack([across * np.cos(angle), across * np.sin(angle), z * piece.length]))
+    corners = piece.vertices[:: 1 + len(piece.vertices) // _CORNERS]
+    middle = piece.vertices.mean(axis=0)
+    return np.vstack([middle + share * (corners - middle) for share in _SHARES])
 
 
 def _pairs(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:

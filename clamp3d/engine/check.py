@@ -19,7 +19,7 @@ from clamp3d.engine.broad import Boxes, box_gaps, near_pairs
 from clamp3d.engine.check_motions import check_motions
 from clamp3d.engine.depth import penetration
 from clamp3d.engine.judge import judge
-from clamp3d.engine.model import Counters, Model, ModelCache, Progress
+from clamp3d.engine.model import Counters, Model, ModelCache, Progress, ignore
 from clamp3d.engine.reasons import failure, undecided
 from clamp3d.engine.refine import accuracy_for, measured, with_normal
 from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
@@ -103,7 +103,7 @@ def check(
     near = _candidates(boxes, scene.thresholds.reach, named, everything=distances)
     cache.counters.queries["boxes"] += len(near)
     log.end("broad phase")
-    progress, on_row = progress or _ignore, on_row or _ignore
+    progress, on_row = progress or ignore, on_row or ignore
     questions = _Questions(scene, models, distances, depths)
     rows = questions.rows(_Pair.of(near, box_gaps(boxes, near), poses), progress, on_row)
     log.end("pairs")
@@ -137,10 +137,6 @@ class _Log:
         counts = {name: built[name] for name in ("meshes", "triangles", "hulls", "fits")}
         totals = {"parts": parts, "shapes": shapes, "pairs": pairs, "candidates": candidates}
         return Work(**totals, **counts, queries=queries, decided=dict(+decided), seconds=self._seconds)
-
-
-def _ignore(*_: object) -> None:
-    """Progress and rows that nobody follows."""
 
 
 def _numbered(scene: Scene, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:

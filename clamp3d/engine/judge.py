@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import depth_of_pieces
@@ -73,7 +74,7 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, within ``contact`` mm."""
     if not (inner.is_simple and outer.is_simple and inner.chords and outer.chords):
         return False
-    if not _boxes_allow(inner, outer, T, contact):
+    if not may_hold(inner, outer, T, contact):
         return False
     inner.counters.queries["containment"] += 1
     both_exact = inner.exact is not None and outer.exact is not None
@@ -94,12 +95,12 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     return shared.volume >= inner.exact.volume - contact * shared.area
 
 
-def _boxes_allow(inner: Model, outer: Model, T: Array, contact: float) -> bool:
-    """Whether the boxes of two parts leave open that one holds the other: cheap, without a mesh."""
+def may_hold(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:
+    """Whether the boxes of two parts leave open that ``inner``, at ``T`` (..., 4, 4) in outer's frame, lies in it."""
     low, high = outer.bounds
     middle, half = 0.5 * (inner.bounds[0] + inner.bounds[1]), 0.5 * (inner.bounds[1] - inner.bounds[0])
-    centre = T[:3, :3] @ middle + T[:3, 3]
+    centre = T[..., :3, :3] @ middle + T[..., :3, 3]
     # It touches each side of its box, so in any direction it reaches to a third of the box's extent below the middle:
     # so far does the mean of the points on the three sides that are furthest along that direction.
-    reach = np.abs(T[:3, :3]) @ half / 3.0 + contact
-    return bool(((centre + reach >= low) & (centre - reach <= high)).all())
+    reach = np.abs(T[..., :3, :3]) @ half / 3.0 + contact
+    return np.asarray(((centre + reach >= low) & (centre - reach <= high)).all(axis=-1))

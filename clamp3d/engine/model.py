@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 """What is being done, how much of it is, and of how much."""
 
+
+def ignore(*_: object) -> None:
+    """Progress that nobody follows."""
+
+
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
 _MOST_FINE = 80_000

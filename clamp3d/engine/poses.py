@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import array, instance, items
-from clamp3d.engine.batch import bounds_at_poses
+from clamp3d.checks import array, function, instance, items
+from clamp3d.engine.batch import bounds_at_poses, overlaps_at_poses
 from clamp3d.engine.broad import Boxes, near_between
-from clamp3d.engine.judge import judge, kind_of_overlap
-from clamp3d.engine.model import Model, ModelCache
+from clamp3d.engine.judge import judge, kind_of_overlap, may_hold
+from clamp3d.engine.model import Model, ModelCache, Progress, ignore
 from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import VERDICTS, Thresholds, Verdict
@@ -22,8 +22,7 @@ from clamp3d.errors import InputError, MissingLibraryError
 from clamp3d.geometry.pose import Array, check_pose_array, inverse
 
 _NAMES = np.array([verdict.value for verdict in VERDICTS])
-_OPEN = [VERDICTS.index(verdict) for verdict in (Verdict.CLASH, Verdict.UNCERTAIN)]
-"""Verdicts of bounds that are not the last word: a part that clashes may hold the other whole."""
+_CLASH, _UNCERTAIN = VERDICTS.index(Verdict.CLASH), VERDICTS.index(Verdict.UNCERTAIN)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,6 +88,7 @@ def check_poses(
     poses: ArrayLike,
     *,
     others: tuple[str, ...] | None = None,
+    progress: Progress | None = None,
     cache: ModelCache | None = None,
 ) -> PoseVerdicts:
     """Verdicts of one part of a scene at many poses.
@@ -103,6 +103,8 @@ def check_poses(
         Its poses in the world, mm.
     others : tuple of str, optional
         Names of the parts it may meet; all others by default.
+    progress : callable, optional
+        Called with (stage, done, of) for each pose that is measured by itself; most are measured together.
     cache : ModelCache, optional
         Keeps models from one call to the next.
 
@@ -127,7 +129,8 @@ def check_poses(
     instance("scene", scene, Scene)
     if cache is not None:
         instance("cache", cache, ModelCache)
-    cache = cache or ModelCache()
+    function("progress", progress)
+    cache, progress = cache or ModelCache(), progress or ignore
     number = scene.index(part)
     names = tuple(p.name for p in scene.parts if p.name != part)
     names = names if others is None else items("others", others, "part names")
@@ -146,22 +149,29 @@ def check_poses(
         own = np.flatnonzero(column == k)
         if len(own):
             relative = inverse(P[k]) @ T[row[own]]
-            judged = _judged(other, moving, relative, scene.thresholds, scene.allowance(part, name))
+            judged = _judged(other, moving, relative, scene.thresholds, scene.allowance(part, name), progress)
             least[own], most[own], rank[own] = judged
     least[least < 0.0] = -np.inf  # how deep a point lies in the other bounds verdicts, not the way out
     return PoseVerdicts(part, names, len(T), reach, row, column, least, most, rank)
 
 
 def _judged(
-    a: Model, b: Model, T: Array, thresholds: Thresholds, allowance: float | None
+    a: Model, b: Model, T: Array, thresholds: Thresholds, allowance: float | None, progress: Progress
 ) -> tuple[Array, Array, NDArray[np.int8]]:
     """Bounds of the signed distances (m,) of ``b`` at ``T`` (m, 4, 4) in a's frame, and their verdicts' places."""
     batch = bounds_at_poses(a, b, T)
     least, most = batch.lower.copy(), batch.upper.copy()
+    undecided = thresholds.verdicts(least, most, allowance) == _UNCERTAIN
+    most[undecided] = np.minimum(most[undecided], overlaps_at_poses(a, b, T[undecided]))
     rank = thresholds.verdicts(least, most, allowance)
-    for k in np.flatnonzero(np.isin(rank, _OPEN)).tolist():
+    # A part that clashes may hold the other whole.
+    clash = np.flatnonzero(rank == _CLASH)
+    holds = may_hold(b, a, T[clash], thresholds.contact) | may_hold(a, b, inverse(T[clash]), thresholds.contact)
+    still_open = np.union1d(np.flatnonzero(rank == _UNCERTAIN), clash[holds])
+    for n, k in enumerate(still_open.tolist()):
+        progress("poses", n, len(still_open))
         try:
-            if VERDICTS[rank[k]] is Verdict.CLASH:
+            if rank[k] == _CLASH:
                 rank[k] = VERDICTS.index(kind_of_overlap(a, b, T[k], thresholds.contact))
                 continue
             a.counters.queries["boxes"] += 1
