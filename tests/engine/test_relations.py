@@ -7,6 +7,7 @@ import pytest
 from clamp3d import InputError, Part, Scene, check, shapes
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.relations import relation
+from clamp3d.geometry.meshing import mesh
 from clamp3d.kernel import translation
 
 TURNED = translation(30.0, -7.0, 4.0) @ [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
@@ -44,6 +45,16 @@ def test_the_holes_of_a_block_are_found_wherever_they_are():
     block = Part("block", shapes.box(40.0, 30.0, 8.0, holes=[shapes.Hole(3.0, (10.0, -2.0))]), TURNED)
     pin = Part("pin", shapes.cylinder(3.01, 20.0), TURNED @ translation(10.0, -2.0, 3.0))
     assert relation(block, pin).kind == relation(pin, block).kind == "press"
+
+
+@pytest.mark.parametrize(("found", "kind"), [("round", "press"), ("off", None)])
+def test_meshes_fit_only_where_round_surfaces_are_looked_for(found, kind):
+    block = shapes.box(40.0, 30.0, 8.0, holes=[shapes.Hole(3.0, (10.0, -2.0))])
+    pin = shapes.cylinder(3.01, 20.0)
+    meshes = [mesh(shape, 0.01) for shape in (block, pin)]
+    facets = [shapes.MeshShape(shapes.make_mesh(m.vertices, m.faces), fit=found) for m in meshes]
+    match = relation(Part("block", facets[0]), Part("pin", facets[1], translation(10.0, -2.0, 3.0)))
+    assert (match and match.kind) == kind
 
 
 def bolted(*rules, sink=0.0):
