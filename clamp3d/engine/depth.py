@@ -41,6 +41,8 @@ _SHARP = 1.1
 """Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
 QUICK_CHORD = 0.005
 """Chord error (mm) for depths of solids from CAD where no distances are asked for: half the usual contact threshold."""
+_SMALL = 0.02
+"""Ratio of a coarse mesh's error to a depth up to which that is not measured on a finer one, but for `fine`."""
 _CLOSE = 1.05
 """Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
@@ -92,7 +94,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     unknown = replace(distance, lower=-np.inf, interference=interference)
     if not (a.chords and b.chords):
         return unknown
-    outer_a, outer_b = (_depth_mesh(model, fine) for model in (a, b))
+    outer_a, outer_b = (_depth_mesh(model, 0.0 if fine else interference[0]) for model in (a, b))
     shared = common(outer_a, outer_b, T)
     if shared is None:
         return unknown
@@ -129,13 +131,15 @@ def _is_sharp(bound: float, reached: float) -> bool:
     return bound <= _SHARP * reached
 
 
-def _depth_mesh(model: Model, fine: bool) -> Surface:
-    """The mesh that the depth of a part is measured on: the coarse one where a finer one takes too long to make."""
-    finest = model.chords[min(1, len(model.chords) - 1)]
+def _depth_mesh(model: Model, depth: float) -> Surface:
+    """The mesh that is fine enough for a depth (mm), the finest for 0; the coarse one where those take too long."""
+    coarse, finest = model.outer(model.chords[0]), model.chords[min(1, len(model.chords) - 1)]
+    if model.exact is not None and coarse.error <= _SMALL * depth:
+        return coarse
     try:
-        return model.outer(finest if fine or model.exact is None else max(finest, QUICK_CHORD))
+        return model.outer(finest if depth == 0.0 or model.exact is None else max(finest, QUICK_CHORD))
     except Clamp3dError:
-        return model.outer(model.chords[0])
+        return coarse
 
 
 def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array]:

@@ -18,6 +18,7 @@ from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
+from clamp3d.engine.refine import refine
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.files import cad_process, pairs
 from clamp3d.files.open_cascade import to_bytes
@@ -58,6 +59,16 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert -distance.lower > 0.5
     assert ("CASCADE" in distance.method) is found
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
+
+
+@pytest.mark.parametrize(("gap", "meshes"), [(-8.0, 2), (-0.5, 3)])
+def test_a_deep_overlap_is_measured_on_coarse_meshes(gap, meshes):
+    solids = (ball(12.0), moved(ball(12.0), shift(24.0 + gap)))
+    a, b = (model_of(BrepSolid.of(solid, "x"), Counters()) for solid in solids)
+    distance = penetration(a, b, np.eye(4), refine(a, b, np.eye(4), Distance(), lambda d: d.upper < 0.0), fine=False)
+    assert distance.lower <= gap <= distance.upper
+    assert distance.lower >= 1.15 * gap
+    assert a.counters.built["meshes"] == b.counters.built["meshes"] == meshes  # one of them to see that it is no hull
 
 
 def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
