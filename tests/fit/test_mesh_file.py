@@ -7,12 +7,22 @@ import trimesh
 
 from clamp3d import InputError, fit_file, fit_mesh
 from clamp3d.shapes import make_mesh
-from tests.fit.fit_shapes import splint
+from tests.fit.fit_shapes import RADIUS, splint
 
 
 @pytest.fixture(scope="module")
 def part():
     return splint(0.3, hole=11.0)
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "obj", "3mf"])
+def test_formats_in_mm(part, tmp_path, kind):
+    file = tmp_path / f"part.{kind}"
+    part.export(file)
+    result = fit_file(file)
+    assert [round(g.radius, 2) for g in result.grooves] == [round(RADIUS, 2)] * 2
+    assert result.mesh.watertight
+    assert any("carries no unit" in note for note in result.notes) == (kind != "3mf")
 
 
 def test_other_files_are_refused(tmp_path):
