@@ -289,8 +289,6 @@ class Method(Quiet):
 
         Raises click.UsageError for options that do not go together.
         """
-        from clamp3d.clamp.assemble import STEP, TILT_STEP
-
         by_step = self.step is not None or self.tilt_step is not None
         if self.solver == "exact" and by_step:
             raise click.UsageError("--step and --tilt-step-deg go with --solver stepped, not exact")
@@ -299,8 +297,13 @@ class Method(Quiet):
         if equilibria and solver != "exact":
             raise click.UsageError(f"--equilibria goes with --solver exact, not {solver}")
         others = self.method == "cas" and solver == "exact" if equilibria is None else equilibria
-        moves = STEP if self.step is None else self.step, TILT_STEP if self.tilt_step is None else self.tilt_step
-        return {"solver": solver, "others": others, "sequence": self.sequence, "moves": moves}
+        settings = {"solver": solver, "others": others, "sequence": self.sequence}
+        if by_step:
+            from clamp3d.clamp.assemble import STEP, TILT_STEP  # takes long to import, and scenes are shown without it
+
+            step, tilt_step = STEP if self.step is None else self.step, self.tilt_step
+            settings["moves"] = step, TILT_STEP if tilt_step is None else tilt_step
+        return settings
 
     def model(self, clamp: Clamp) -> ContactModel:
         """The contact model. Raises InputError for options that do not go with it."""

@@ -16,8 +16,8 @@ from clamp3d.geometry.pose import Array, inverse, to_target
 from clamp3d.geometry.primitives import Cylinder
 from clamp3d.kernel.distance import signed_distances
 
-_SHARES = (0.0, 0.6, 0.98)
-"""How far out points of a piece are tried, from its middle to its surface."""
+_SHARES = (0.6, 0.98)
+"""How far out points of a piece are tried besides those in its middle."""
 _IN_A_ROD = (np.linspace(-0.49, 0.49, 7), np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False), np.array(_SHARES))
 """Where along a cylinder, in lengths, at which angles, and how far out points are tried."""
 _BLOCK = 2000
@@ -81,11 +81,12 @@ def _points_in(piece: Convex) -> Array:
     """Points (k, 3) in a piece: in the middle, and just under the side, the ends or the corners."""
     if isinstance(piece, Rod):
         z, angle, share = (x.ravel() for x in np.meshgrid(*_IN_A_ROD))
-        across = share * piece.radius
-        return to_target(piece.T, np.column_stack([across * np.cos(angle), across * np.sin(angle), z * piece.length]))
+        around = np.column_stack([share * np.cos(angle), share * np.sin(angle), z])
+        axis = np.column_stack([np.zeros((len(_IN_A_ROD[0]), 2)), _IN_A_ROD[0]])
+        return to_target(piece.T, np.vstack([axis, around]) * (piece.radius, piece.radius, piece.length))
     corners = piece.vertices[:: 1 + len(piece.vertices) // _CORNERS]
     middle = piece.vertices.mean(axis=0)
-    return np.vstack([middle + share * (corners - middle) for share in _SHARES])
+    return np.vstack([middle, *(middle + share * (corners - middle) for share in _SHARES)])
 
 
 def _pairs(a: ClosedForm, b: ClosedForm) -> list[tuple[Bore, Rod]]:

@@ -94,7 +94,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     unknown = replace(distance, lower=-np.inf, interference=interference)
     if not (a.chords and b.chords):
         return unknown
-    outer_a, outer_b = (_depth_mesh(model, 0.0 if fine else interference[0]) for model in (a, b))
+    outer_a, outer_b = (_depth_mesh(model, interference[0], fine) for model in (a, b))
     shared = common(outer_a, outer_b, T)
     if shared is None:
         return unknown
@@ -106,16 +106,16 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     method = distance.method
     hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it otherwise
     if length > LONG * (depth + hidden):
-        by_itself = Distance()
+        by_itself = Distance()  # of other shapes than two solids from CAD
         if a.exact is not None and b.exact is not None:
             from clamp3d.engine.exact import exact_overlap
 
             by_itself = exact_overlap(a, b, T, SHARES[1] if fine else _SHARE)
         if np.isinf(by_itself.lower):
-            by_itself = replace(distance, lower=-hidden - thickness(outer_a, outer_b, T, shared, _is_sharp, FEW_CUTS))
+            most = hidden + thickness(outer_a, outer_b, T, shared, _is_sharp, FEW_CUTS)
+            by_itself = replace(by_itself, lower=-most, method=distance.method)
         depth, interference = max(depth, -by_itself.upper), (depth, min(interference[1], -by_itself.lower))
-        upper = min(upper, -depth)
-        method = by_itself.method if np.isfinite(by_itself.lower) else method
+        upper, method = min(upper, -depth), by_itself.method
     interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
     return replace(
         distance,
@@ -131,13 +131,13 @@ def _is_sharp(bound: float, reached: float) -> bool:
     return bound <= _SHARP * reached
 
 
-def _depth_mesh(model: Model, depth: float) -> Surface:
-    """The mesh that is fine enough for a depth (mm), the finest for 0; the coarse one where those take too long."""
+def _depth_mesh(model: Model, depth: float, fine: bool) -> Surface:
+    """The mesh that a depth of at least ``depth`` mm is measured on: the coarse one where finer ones take too long."""
     coarse, finest = model.outer(model.chords[0]), model.chords[min(1, len(model.chords) - 1)]
-    if model.exact is not None and coarse.error <= _SMALL * depth:
+    if model.exact is not None and coarse.error <= (0.0 if fine else _SMALL * depth):
         return coarse
     try:
-        return model.outer(finest if depth == 0.0 or model.exact is None else max(finest, QUICK_CHORD))
+        return model.outer(finest if fine or model.exact is None else max(finest, QUICK_CHORD))
     except Clamp3dError:
         return coarse
 

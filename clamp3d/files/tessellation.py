@@ -66,7 +66,7 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
         occ.BRepTools.Clean_s(solid)
         occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord / finer, False, ANGLE, False)
         meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
-        overlooked = [_overlooked(*it) for it in zip(faces, form.kind, *zip(*meshes, strict=True), strict=True)]
+        overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
         if max((off.max(initial=0.0) for off in overlooked), default=0.0) <= chord:
             break
     corners, triples, numbers, errors = [], [], [], []

@@ -55,7 +55,7 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     a, b = models(family, -0.04)
     distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.02), fine=False)
     least, most = distance.interference
-    assert least <= 0.04 <= most
+    assert 0.035 < least <= 0.04 <= most  # points attest it exactly, also where no common part is found
     assert -distance.lower > 0.5
     assert ("CASCADE" in distance.method) is found
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
