@@ -37,6 +37,19 @@ def test_wires_and_splints_on_the_way_are_as_far_apart_as_their_outlines(line, j
             assert d.value == pytest.approx(outline[a].distance(outline[b]), abs=3e-5), (waypoint.label, a, b)
 
 
+def test_reference_differs_from_its_matrix_where_the_bolt_has_play(run):
+    assert [(d.a, d.b, d.declared, d.measured) for d in run.matrix_differences] == [
+        ("P1", "P4", 2, 0),
+        ("P2", "P4", 2, 0),
+    ]
+    assert "P1-P4 (up splint, bolt) declared 2 (convex object collision) but does not touch: 1.000 mm apart" in str(
+        run.matrix_differences[0]
+    )
+    found = {(c.a, c.b): c for c in run.contacts}
+    for pair in (("P1", "P4"), ("P2", "P4")):
+        assert (found[pair].relation, found[pair].feature) == ("none", "hole")
+
+
 def test_the_last_waypoint_has_the_contacts_of_the_final_state(run):
     assert {(c.a, c.b): c.gap for c in run.contacts_at(run.path[-1])} == {(c.a, c.b): c.gap for c in run.contacts}
     assert {pair: c.type for pair, c in run.matrix.items()} == {

@@ -54,6 +54,7 @@ def test_a_run_tells_the_others_when_asked(run):
     assert [(len(p.joints), round(p.distance, 3)) for p in run.with_play] == [(1, 31.428), (2, 31.427), (3, 31.416)]
     assert all(abs(e.closing - run.closing) > 1e-6 or abs(e.tilt - run.tilt) > 1e-6 for e in run.others)
     for e in run.others:
+        assert str(e) in [finding.text for finding in run.findings if finding.severity == "note"]
         assert e.is_equilibrium == ("slips" not in e.detail)
     assert len(run.to_dict()["other_ends"]) == len(run.others)
 

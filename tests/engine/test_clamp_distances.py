@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from clamp3d import Verdict, assemble, check, measure
+from clamp3d import Verdict, assemble, check, distance, measure
 from clamp3d.engine.model import ModelCache
 from clamp3d.geometry.pose import inverse
 from tests.kinds import measured_alike
@@ -55,3 +55,8 @@ def test_the_reference_clamp(run):
     measured_alike(scene, check(scene))
     for groove, part in itertools.product(("P1", "P2"), ("P6", "P7")):
         assert found[groove, part].method == "groove kernel"
+    for a, b in (("P1", "P2"), ("P3", "P5")):
+        first, second = (scene.parts[scene.index(name)] for name in (a, b))
+        T = inverse(first.T_world) @ second.T_world
+        assert distance(first.shape, second.shape, T).value == found[a, b].value
+        assert distance(second.shape, first.shape, inverse(T)).value == pytest.approx(found[a, b].value, abs=1e-9)

@@ -122,6 +122,9 @@ def test_what_is_mended_or_wrong_of_a_mesh_is_noted():
         "not closed: 3 edges with one triangle, 0 with more than two, 0 with both on one side: "
         "what is inside is not known",
     )
+    V = np.vstack([BOX.vertices, 0.5 * (BOX.vertices[0] + BOX.vertices[1])])
+    flat = make_mesh(V, np.vstack([BOX.faces, [[0, 1, len(BOX.vertices)]]]))  # along an edge, which it opens not
+    assert (flat.watertight, flat.notes, len(flat.vertices)) == (True, ("1 triangles without an area left out",), 8)
     beside = [trimesh.util.concatenate([BOX, BOX.copy().apply_translation((10.0, y, 0.0))]) for y in (10.0, 0.0)]
     at_edge, welded = (make_mesh(both.vertices, both.faces) for both in beside)
     assert at_edge.watertight

@@ -221,7 +221,7 @@ BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="t
         (BASE, '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
         (BASE, '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
         ('radius="0.01"', 'radius="big"', "not a readable URDF file"),
-        ('radius="0.01"', 'radius="-1"', r"tip \(radius of a sphere must be"),
+        ('radius="0.01"', 'radius="-1"', r"missing: rail \(.*; tip \(radius of a sphere must be"),
         ('"turn" type="revolute"', '"turn" type="revolut"', "joint turn must be one of revolute, .*got 'revolut'"),
         ('"turn" type="revolute"', '"turn"', "type of joint turn must be one of revolute, .*got None"),
         ("robot", "robots", "it holds <robots>, not <robot>"),
