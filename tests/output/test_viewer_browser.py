@@ -69,7 +69,7 @@ def saved(browser, tmp_path_factory):
             files[id(shown)] = path, shown
         page = open_page(browser, files[id(shown)][0].as_uri() + fragment, offline=True, **options)
         wait_for(page, "document.querySelector('.part')")
-        page.wait_for_timeout(200)
+        settle(page)
         pages.append(page)
         return page
 
@@ -131,6 +131,11 @@ def wait_for(page, condition):
     page.wait_for_function(f"() => {condition}", timeout=30_000)
 
 
+def settle(page):
+    """Lets the page do what it puts off by up to 50 ms, then draw: only a drawn picture has turned its camera."""
+    page.evaluate("new Promise((d) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(d)), 60))")
+
+
 def poses_in_browser(page, names):
     """Pose (4, 4) in mm of each part, from the browser's world matrices."""
     values = page.evaluate(
@@ -157,6 +162,7 @@ def pixels(page):
 
 def on_screen(page, points):
     """Pixel (column, row) of each world point (n, 3) mm."""
+    settle(page)
     return page.evaluate(
         """points => {
             const root = viewer.scene_tree.find(["clamp3d"]).object;
@@ -188,7 +194,7 @@ def assert_drawn(page, poses):
 def go_to(page, number):
     wait_for(page, f"document.getElementById('marks').children.length > {number}")
     page.evaluate("n => document.getElementById('marks').children[n].click()", number)
-    page.wait_for_timeout(100)
+    settle(page)
 
 
 def seek(page, seconds):
@@ -217,7 +223,7 @@ def test_findings_of_a_check_lead_to_their_places(hinge_page, hinge):
     page.keyboard.press("Escape")
     for row in rows:
         page.keyboard.press("n")
-        page.wait_for_timeout(100)
+        settle(page)
         label = page.inner_text("#label")
         assert ("first contact" in label) == (row.contact_at is not None and row.contact_at > 0.0)
         assert (row.motion or "at rest") in label
@@ -259,14 +265,14 @@ def test_page_on_a_phone(dark_phone):
         box = element.bounding_box()
         assert min(box["width"], box["height"]) >= 36  # big enough for a finger
     page.tap(".finding")
-    page.wait_for_timeout(200)
+    settle(page)
     assert page.query_selector(".finding.now")
 
 
 def test_page_in_dark_mode_is_dark_and_readable(dark_phone):
     page = dark_phone
     page.keyboard.press("h")
-    page.wait_for_timeout(300)
+    settle(page)
     image = pixels(page)
     assert image[5, -5].max() < 70  # behind the parts
     assert image[-5, 5].max() < 70  # the panel
@@ -297,7 +303,7 @@ def test_page_of_a_fit_follows_the_scheme(browser, tmp_path):
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         page.reload()
-        page.wait_for_timeout(300)
+        settle(page)
         image = pixels(page)
         for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
             assert image[y, x].min() > 200 if scheme == "light" else image[y, x].max() < 70
@@ -394,11 +400,11 @@ def test_page_steps_through_the_sequence(served):
         for kind in ("contacts", "gaps"):
             assert [visible(page, kind, group) for group in groups] == [group == groups[number] for group in groups]
         page.click("#forward")
-        page.wait_for_timeout(50)
+        settle(page)
     assert_drawn(page, run.poses)  # cut open as it is opened
     before = camera(page)
     page.click(".stop:not([hidden]) tr[data-a=P1][data-b=P2] button")
-    page.wait_for_timeout(100)
+    settle(page)
     assert np.linalg.norm(camera(page) - before) > 0.5
     assert opacity(page, "P6") < 0.2
     assert opacity(page, "P1") == 1.0
@@ -538,12 +544,12 @@ def test_the_address_names_the_finding_and_the_camera(saved, hinge_page, hinge):
     page = hinge_page
     page.evaluate("id => { location.hash = 'finding=' + id; }", group.id)
     wait_for(page, f"document.querySelector('.finding.now')?.dataset.id === '{group.id}'")
-    page.wait_for_timeout(200)
+    settle(page)
     page.mouse.move(800, 300)
     page.mouse.down()
     page.mouse.move(900, 340)
     page.mouse.up()
-    page.wait_for_timeout(200)
+    settle(page)
     seen, fragment = camera(page), page.evaluate("location.hash")
     again = saved(hinge, fragment)
     assert again.get_attribute(".finding.now", "data-id") == group.id
