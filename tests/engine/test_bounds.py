@@ -27,7 +27,7 @@ BARE = st.tuples(
 ROUND = [shape for shape in DRAWN if any(e.profile.arcs for e in (*shape.bodies, *shape.holes))]
 
 
-@settings(SLOW, max_examples=30)
+@settings(SLOW, max_examples=15)
 @given(st.tuples(SOME, SOME) | BARE, poses(9.0) | poses(25.0))
 def test_any_pair_of_solids_drawn_or_faceted(pair, T):
     a, b = pair

@@ -108,11 +108,17 @@ def sliding():
     return check(scene.with_motion(Motion.translate((-25.0, 0.0, 0.0), parts="slider", name="push")), distances=True)
 
 
+@pytest.fixture(scope="module")
+def sliding_tab(saved, sliding):
+    return saved(sliding)
+
+
 @pytest.fixture
-def sliding_page(saved, sliding):
-    """Its page at rest, with nothing picked."""
-    page = saved(sliding)
+def sliding_page(sliding_tab):
+    """Its page at rest, with nothing picked and nothing cut."""
+    page = sliding_tab
     page.keyboard.press("Escape")
+    page.select_option("#section-axis", "")
     go_to(page, 0)
     return page
 
@@ -523,8 +529,6 @@ def test_two_clicks_measure_also_on_a_cut(sliding_page):
 
 def test_a_part_can_be_named_isolated_ghosted_and_hidden(sliding_page):
     page = sliding_page
-    page.select_option("#section-axis", "")
-    page.keyboard.press("Escape")
     ((x, y),) = on_screen(page, [(30.0, -5.0, 0.0)])
     page.mouse.click(x, y)
     assert page.inner_text("#identity b") == "slider"
