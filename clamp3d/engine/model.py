@@ -17,7 +17,7 @@ import numpy as np
 from clamp3d.engine.closed_form import ClosedForm
 from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
-from clamp3d.engine.surface import Surface, at_edges
+from clamp3d.engine.surface import SMOOTH, Surface, at_edges
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, CYLINDER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
@@ -262,7 +262,8 @@ class CadModel(Model):
 
     def _surface(self, chord: float, inside: bool) -> Surface:
         mesh = self.shape.tessellated(chord)
-        return Surface(mesh.vertices, mesh.faces, at_edges(mesh.vertices, mesh.faces, mesh.errors))
+        errors = at_edges(mesh.vertices, mesh.faces, mesh.errors, mesh.face, SMOOTH)
+        return Surface(mesh.vertices, mesh.faces, errors)
 
 
 class MeshModel(Model):

@@ -21,8 +21,8 @@ from clamp3d.geometry.triangles import normals_and_areas
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
-_SHARP = np.cos(np.radians(30.0))
-"""Cosine of the angle between the normals of two triangles beyond which their edge is one of the part's."""
+SMOOTH = np.radians(30.0)
+"""Angle (rad) between two triangles up to which the patches that they stand for can go over into each other."""
 
 
 @dataclass(eq=False)
@@ -215,10 +215,12 @@ def fcl_pair(a: Any, b: Any, T: Array) -> tuple[Any, Any]:
     return fcl.CollisionObject(a, fcl.Transform()), fcl.CollisionObject(b, fcl.Transform(T[:3, :3], T[:3, 3]))
 
 
-def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDArray[np.int64] | None = None) -> Array:
+def at_edges(
+    vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDArray[np.int64], smooth: float = 0.0
+) -> Array:
     """Errors (m,) of triangles that hold for their patches' true borders too; ``error`` (m,) is square to each patch.
 
-    ``patch`` (m,) numbers the patches; else triangles that meet at more than 30 degrees are of two.
+    ``patch`` (m,) numbers the patches; they have no border where they meet at less than ``smooth`` rad.
     Two patches that bulge by e and f meet within (e + f) / sin(w) of the edge between them, w being the angle of the
     material if that is acute; else within e + f. At a blunt or hollow edge with a flat patch the foot of every point
     lies on the mesh.
@@ -232,7 +234,7 @@ def at_edges(vertices: Array, faces: NDArray[np.int64], error: Array, patch: NDA
     total = both.sum(axis=1)
     knife = convex & (cosine < 0.0)
     total[knife] /= np.maximum(np.sqrt(1.0 - np.minimum(1.0, cosine[knife] ** 2)), 1e-6)
-    sharp = cosine < _SHARP if patch is None else patch[pairs[:, 0]] != patch[pairs[:, 1]]
+    sharp = (patch[pairs[:, 0]] != patch[pairs[:, 1]]) & (cosine <= np.cos(smooth) + 1e-9)
     wider = sharp & ((knife & (total > 0.0)) | (both > 0.0).all(axis=1))
     widened = error.copy()
     for side in (0, 1):

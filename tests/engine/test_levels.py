@@ -16,7 +16,7 @@ from clamp3d.engine.facets import rods_distance
 from clamp3d.engine.mesh_distance import are_apart, meshes_distance, nearest_points, surface_distance, within
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.overlap import cut_up
-from clamp3d.engine.surface import Surface, at_edges, fcl_pair, fcl_tree
+from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import inverse, rotation, to_source, to_target, translation
 from clamp3d.geometry.primitives import SweptArc
@@ -205,8 +205,9 @@ def test_errors_beside_an_edge_reach_the_true_edge(angle, errors, apart, widened
     F = np.array([(0, 2, 3), (0, 3, 1), (0, 1, 5), (0, 5, 4)])
     e, f = errors
     for step in (1, -1):
-        patch = None if apart is None else np.array([0, 0, int(apart), int(apart)])[::step]
-        found = at_edges(V, F[::step], np.array([e, e, f, f])[::step], patch)
+        patch = np.array([0, 0, 1, 1]) if apart is None else np.array([0, 0, int(apart), int(apart)])
+        smooth = SMOOTH if apart is None else 0.0
+        found = at_edges(V, F[::step], np.array([e, e, f, f])[::step], patch[::step], smooth)
         assert found[::step] == pytest.approx([e, *widened, f], rel=1e-9)
     if angle < 90 and apart is None:
         assert math.sqrt(e * e + f * f + 2.0 * e * f * math.cos(w)) / math.sin(w) <= max(widened) * (1.0 + 1e-9)
