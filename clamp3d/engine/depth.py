@@ -7,6 +7,7 @@ the other, and at most as long as a translation after which the bodies are verif
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,47 +85,69 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         ``upper`` is minus a depth that a point has, ``lower`` minus the length of a verified translation, minus
         infinity if none was found; ``normal`` is its direction.
     """
-    if distance.lower >= 0.0 or not (a.is_simple and b.is_simple):
-        return distance if distance.lower >= 0.0 else distance.of_overlap()
-    interference = (max(0.0, -distance.upper), max(0.0, -distance.lower))
+    if distance.lower >= 0.0:
+        return distance
+    if not (a.is_simple and b.is_simple):
+        return distance.of_overlap()
+    depth, at_most = max(0.0, -distance.upper), max(0.0, -distance.lower)
     exact = depth_of_pieces(a, b, T)
     if exact is not None:
         upper = max(exact.lower, min(exact.upper, distance.upper))
-        return replace(exact, upper=upper, interference=interference, level=distance.level)
-    unknown = replace(distance, lower=-np.inf, interference=interference)
-    if not (a.chords and b.chords):
-        return unknown
-    outer_a, outer_b = (_depth_mesh(model, interference[0], fine) for model in (a, b))
-    shared = common(outer_a, outer_b, T)
-    if shared is None:
-        return unknown
-    # Meshes around drawn bodies attest no depth.
-    attested = 0.0 if a.bracketed or b.bracketed else deepest(outer_a, outer_b, T, shared)[0]
-    depth = max(interference[0], attested)
-    upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
-    length, direction = _way_out(outer_a, outer_b, T, shared, depth)
+        return replace(exact, upper=upper, interference=(depth, at_most), level=distance.level)
+    meshes = _overlapping_meshes(a, b, T, depth, fine)
+    if meshes is None:
+        return replace(distance, lower=-np.inf, interference=(depth, at_most))
+    if not (a.bracketed or b.bracketed):  # meshes around drawn bodies attest no depth
+        depth = max(depth, deepest(*meshes)[0])
+    length, direction = _way_out(meshes, depth)
     method = distance.method
-    hidden = outer_a.error + outer_b.error  # what coarse meshes hide of a depth is no reason to measure it otherwise
-    if length > LONG * (depth + hidden):
-        by_itself = Distance()  # of other shapes than two solids from CAD
-        if a.exact is not None and b.exact is not None:
-            from clamp3d.engine.exact import exact_overlap
-
-            by_itself = exact_overlap(a, b, T, SHARES[1] if fine else _SHARE)
-        if np.isinf(by_itself.lower):
-            most = hidden + thickness(outer_a, outer_b, T, shared, _is_sharp, FEW_CUTS)
-            by_itself = replace(by_itself, lower=-most, method=distance.method)
-        depth, interference = max(depth, -by_itself.upper), (depth, min(interference[1], -by_itself.lower))
-        upper, method = min(upper, -depth), by_itself.method
-    interference = depth, max(depth, min(interference[1], length))  # no point is deeper than the bodies
+    if length > LONG * (depth + meshes.hidden):
+        own = _interference(a, b, meshes, fine)
+        depth, at_most, method = max(depth, -own.upper), min(at_most, -own.lower), own.method or method
+    upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     return replace(
         distance,
         lower=min(-length, upper),
         upper=upper,
-        interference=interference,
+        interference=(depth, max(depth, min(at_most, length))),  # no point is deeper than the bodies
         normal=direction,
         method=f"{method}; separating move by meshes (FCL)",
     )
+
+
+class _OverlappingMeshes(NamedTuple):
+    """Meshes of two bodies, ``b`` placed by ``T`` (4, 4) in a's frame, and their common part."""
+
+    a: Surface
+    b: Surface
+    T: Array
+    shared: Common
+
+    @property
+    def hidden(self) -> float:
+        """What the meshes' errors may hide of a depth, mm."""
+        return self.a.error + self.b.error
+
+
+def _overlapping_meshes(a: Model, b: Model, T: Array, depth: float, fine: bool) -> _OverlappingMeshes | None:
+    """The meshes that an overlap of at least ``depth`` mm is measured on; None if there are none, or they are apart."""
+    if not (a.chords and b.chords):
+        return None
+    outer_a, outer_b = (_depth_mesh(model, depth, fine) for model in (a, b))
+    shared = common(outer_a, outer_b, T)
+    return None if shared is None else _OverlappingMeshes(outer_a, outer_b, T, shared)
+
+
+def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, fine: bool) -> Distance:
+    """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the meshes."""
+    own = Distance()
+    if a.exact is not None and b.exact is not None:
+        from clamp3d.engine.exact import exact_overlap
+
+        own = exact_overlap(a, b, meshes.T, SHARES[1] if fine else _SHARE)
+    if np.isfinite(own.lower):
+        return own
+    return replace(own, lower=-meshes.hidden - thickness(*meshes, _is_sharp, FEW_CUTS), method="")
 
 
 def _is_sharp(bound: float, reached: float) -> bool:
@@ -142,8 +165,9 @@ def _depth_mesh(model: Model, depth: float, fine: bool) -> Surface:
         return coarse
 
 
-def _way_out(a: Surface, b: Surface, T: Array, shared: Common, depth: float) -> tuple[float, Array]:
+def _way_out(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:
     """Length (mm) and direction (3,) of a translation of ``b`` after which meshes are apart."""
+    a, b, T, shared = meshes
     off = a.error + b.error + rounding_of(a, b, T)
     slack = 2.0 * off
     # Where two faces hold a body, as a V does, its way out is between their normals.
