@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum, auto
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
+from clamp3d.files.boundary import Boundary, Side, vertex
 from clamp3d.files.faces import SPHERE, surfaces
 from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, parse, volume_of
 from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
@@ -25,20 +25,10 @@ _SLENDER = 400.0
 
 _AT_EDGES = 9.0 / 4.0
 """How many times as far as in a triangle's middle a quadratic surface can be from it, at the middle of an edge."""
-_BEYOND = 0.05
-"""How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""
 _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
-
-
-class Side(Enum):
-    """On which side of a solid's surface a point lies."""
-
-    INSIDE = auto()
-    OUTSIDE = auto()
-    UNKNOWN = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +85,7 @@ def distance(a: bytes, b: bytes, T: Array) -> Nearest:
     nearest = _nearest(first, second)
     if nearest.distance <= TOLERANCE:
         return nearest
-    closer = min(_nearest(_vertex(nearest.p), second).distance, _nearest(first, _vertex(nearest.q)).distance)
+    closer = min(_nearest(vertex(nearest.p), second).distance, _nearest(first, vertex(nearest.q)).distance)
     return nearest._replace(is_least=closer >= nearest.distance - TOLERANCE)
 
 
@@ -118,7 +108,7 @@ def _from_ball(centre: Array, radius: float, solid: Any) -> Nearest | None:
     d. A point of the solid in the ball is at least d from the centre; one of the ball is at most r - d from the ball of
     radius d about the centre, which nothing of the solid is in.
     """
-    side, away, foot = _side_and_distance(solid, occ.BRepClass3d_SolidClassifier(solid), centre)
+    side, (away, foot, _) = Boundary(solid).side(centre)
     if side is not Side.OUTSIDE or away <= TOLERANCE:
         return None
     return Nearest(away - radius, centre + radius / away * (foot - centre), foot, is_signed=True)
@@ -131,10 +121,6 @@ def _nearest(a: Any, b: Any) -> Nearest:
         raise Clamp3dError("Open CASCADE finds no distance of the two solids")
     p, q = (np.array(x.Coord()) for x in (search.PointOnShape1(1), search.PointOnShape2(1)))
     return Nearest(float(search.Value()), p, q)
-
-
-def _vertex(point: Array) -> Any:
-    return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
 
 
 def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPart:
@@ -151,7 +137,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         return CommonPart(volume, area, box)
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
     occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
-    solids = from_bytes(a), moved(from_bytes(b), T)
+    boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[tuple[Array, IntArray]], ...] = ([], [])
     chord = 0.0
     for k, face in enumerate(explore(shape, "FACE")):
@@ -160,7 +146,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
             continue
         chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max()))
         middle = points[quads[len(quads) // 2, 3]]
-        away = [_from_surface(solid, middle)[0] for solid in solids]
+        away = [boundary.foot(middle).distance for boundary in boundaries]
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append((points, quads[:, :3]))
@@ -212,31 +198,6 @@ def _heights(points: Array) -> Array:
 
 def depths(brep: bytes, points: Array) -> Array:
     """Signed depth (k,) mm of points (k, 3) in a solid: negative outside, or where nobody knows the side."""
-    shape = from_bytes(brep)
-    classifier = occ.BRepClass3d_SolidClassifier(shape)
-    every = [_side_and_distance(shape, classifier, point) for point in points]
-    return np.array([away if side is Side.INSIDE else -away for side, away, _ in every])
-
-
-def _side_and_distance(solid: Any, classifier: Any, point: Array) -> tuple[Side, float, Array]:
-    """Where a point (3,) lies, its distance (mm) from a solid's surface, and the point (3,) there that is nearest.
-
-    Near splines Open CASCADE errs. What is beyond the nearest point is on the other side: if it says the same of both,
-    nobody knows.
-    """
-
-    def is_outside(point: Array) -> bool:
-        classifier.Perform(occ.gp_Pnt(*point.tolist()), TOLERANCE)
-        return bool(classifier.State() == occ.TopAbs_State.TopAbs_OUT)
-
-    away, foot = _from_surface(solid, point)
-    beyond = foot + min(1.0, _BEYOND / max(away, TOLERANCE)) * (foot - point)
-    side = Side.OUTSIDE if is_outside(point) else Side.INSIDE
-    return (Side.UNKNOWN if is_outside(beyond) is (side is Side.OUTSIDE) else side), away, foot
-
-
-def _from_surface(solid: Any, point: Array) -> tuple[float, Array]:
-    """Distance (mm) of a point (3,) from the surface of a solid, on either side, and the point (3,) nearest to it."""
-    vertex = _vertex(point)
-    nearest = min((_nearest(shell, vertex) for shell in explore(solid, "SHELL")), key=lambda pair: pair.distance)
-    return nearest.distance, nearest.p
+    boundary = Boundary(from_bytes(brep))
+    every = [boundary.side(point) for point in points]
+    return np.array([foot.distance if side is Side.INSIDE else -foot.distance for side, foot in every])

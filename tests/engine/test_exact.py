@@ -19,12 +19,14 @@ from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.refine import refine
+from clamp3d.engine.surface import Surface
 from clamp3d.engine.verdict import Thresholds
-from clamp3d.files import cad_process, pairs
+from clamp3d.files import boundary, cad_process, pairs
 from clamp3d.files.open_cascade import to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
-from tests.cad import ball, block, cut, first_solid, moved, rod, shift, turn
+from clamp3d.geometry.pose import to_target
+from tests.cad import ball, block, cone, cut, first_solid, moved, ring, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -226,19 +228,36 @@ def test_that_faces_coincide_is_proven_by_meshes(family, splines):
 
 
 @pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])
-def test_no_depth_where_both_sides_of_a_surface_are_said_to_be_inside(state, monkeypatch):
+def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monkeypatch):
     """Open CASCADE says so of some points beside splines; what it says of the other side shows it."""
 
     class Wrong:
         def __init__(self, _):
-            self.State = lambda: getattr(pairs.occ.TopAbs_State, state)
+            self.State = lambda: getattr(boundary.occ.TopAbs_State, state)
 
         def Perform(self, *_):
             pass
 
-    monkeypatch.setattr(pairs.occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
-    points = np.array([[0.0, 0.0, 5.1], [0.0, 0.0, 4.9], [0.0, 0.0, 1.0]])
-    brep = BrepSolid.of(ball(5.0), "ball").brep
-    assert pairs.depths(brep, points) == pytest.approx([-0.1, -0.1, -4.0])
-    monkeypatch.undo()
-    assert pairs.depths(brep, points) == pytest.approx([-0.1, 0.1, 4.0])
+    angle = BrepSolid.of(cut(block((-5, -5, -5), (5, 5, 5)), block((0, 0, -6), (6, 6, 6))), "angle").brep
+    at_edges, in_faces = np.array([[-1.0, -1.0, 0.0], [8.0, -9.0, 0.0]]), np.array([[2.0, -1.0, 0.0], [2.0, 1.0, 0.0]])
+    for is_wrong in (True, False):
+        with monkeypatch.context() as patch:
+            if is_wrong:
+                patch.setattr(boundary.occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
+            assert pairs.depths(angle, at_edges) == pytest.approx([-(2.0**0.5) if is_wrong else 2.0**0.5, -5.0])
+            assert pairs.depths(angle, in_faces) == pytest.approx([1.0, -1.0])
+
+
+@pytest.mark.parametrize("shape", [ball(5.0), ring(8.0, 2.0), cone(5.0, 0.0, 0.0, 7.0), cone(2.0, 5.0, 0.0, 7.0)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_depths_of_points_are_those_from_a_fine_mesh(shape, turned):
+    """Inside by its winding numbers; Open CASCADE tells it by the normal at the nearest point."""
+    rng = np.random.default_rng(2)
+    T = random_pose(rng) if turned else np.eye(4)
+    points = rng.uniform(-9.0, 9.0, (40, 3))
+    solid = BrepSolid.of(moved(shape, T), "solid")
+    found = pairs.depths(solid.brep, to_target(T, points))
+    mesh = BrepSolid.of(shape, "solid").tessellated(0.01)
+    surface = Surface(mesh.vertices, mesh.faces)
+    true = np.where(surface.contains(points), 1.0, -1.0) * surface.distance(points)
+    np.testing.assert_allclose(found, true, atol=0.02)

@@ -1,0 +1,96 @@
+"""The surface of a solid by Open CASCADE: how far a point is from it, and on which side."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from clamp3d.errors import Clamp3dError
+from clamp3d.files.open_cascade import explore, occ
+from clamp3d.geometry.mesh import Array
+
+_BEYOND = 0.05
+"""How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""
+
+
+class Side(Enum):
+    """On which side of a solid's surface a point lies."""
+
+    INSIDE = auto()
+    OUTSIDE = auto()
+    UNKNOWN = auto()
+
+
+class Foot(NamedTuple):
+    """The point (3,) of a surface that is nearest to another one, and its distance (mm).
+
+    ``normal`` (3,) points out of the solid; None where the foot is on an edge or a corner.
+    """
+
+    distance: float
+    point: Array
+    normal: Array | None
+
+
+class Boundary:
+    """The shells of a solid, a TopoDS_Shape, loaded once for many points."""
+
+    def __init__(self, solid: Any) -> None:
+        self._solid = solid
+        self._searches = []
+        for shell in explore(solid, "SHELL"):
+            search = occ.BRepExtrema_DistShapeShape()
+            search.LoadS1(shell)
+            self._searches.append(search)
+
+    def foot(self, point: Array) -> Foot:
+        """What of the surface is nearest to a point (3,). Raises Clamp3dError if Open CASCADE finds nothing."""
+        for search in self._searches:
+            search.LoadS2(vertex(point))
+            if not search.Perform() or search.NbSolution() < 1:
+                raise Clamp3dError("Open CASCADE finds no distance of a point from the solid")
+        nearest = min(self._searches, key=lambda search: search.Value())
+        in_face = occ.BRepExtrema_SupportType.BRepExtrema_IsInFace
+        every = range(1, nearest.NbSolution() + 1)
+        k = next((k for k in every if nearest.SupportTypeShape1(k) == in_face), 0)
+        foot = np.array(nearest.PointOnShape1(k or 1).Coord())
+        return Foot(float(nearest.Value()), foot, _normal(nearest, k) if k else None)
+
+    def side(self, point: Array) -> tuple[Side, Foot]:
+        """On which side a point (3,) lies, and its foot.
+
+        Lemma: nothing of the surface is between a point and its foot, so where that is in a face its normal tells the
+        side. On edges the classifier does. Near splines that is wrong now and then: what is beyond the foot is on the
+        other side, and if it says the same of both, nobody knows.
+        """
+        foot = self.foot(point)
+        if foot.normal is not None:
+            return (Side.OUTSIDE if float((point - foot.point) @ foot.normal) >= 0.0 else Side.INSIDE), foot
+        beyond = foot.point + min(1.0, _BEYOND / max(foot.distance, 1e-9)) * (foot.point - point)
+        side = Side.OUTSIDE if self._is_outside(point) else Side.INSIDE
+        return (Side.UNKNOWN if self._is_outside(beyond) is (side is Side.OUTSIDE) else side), foot
+
+    def _is_outside(self, point: Array) -> bool:
+        self._classifier.Perform(occ.gp_Pnt(*point.tolist()), 1e-6)
+        return bool(self._classifier.State() == occ.TopAbs_State.TopAbs_OUT)
+
+    @cached_property
+    def _classifier(self) -> Any:
+        return occ.BRepClass3d_SolidClassifier(self._solid)
+
+
+def vertex(point: Array) -> Any:
+    """A point (3,) as a TopoDS_Vertex."""
+    return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
+
+
+def _normal(search: Any, number: int) -> Array | None:
+    """The outward unit normal (3,) of the face that a solution is on; None where the surface has none there."""
+    face = next(explore(search.SupportOnShape1(number), "FACE"))
+    place, normal = occ.gp_Pnt(), occ.gp_Vec()
+    occ.BRepGProp_Face(face).Normal(*search.ParOnFaceS1(number), place, normal)
+    size = normal.Magnitude()
+    return np.array(normal.Coord()) / size if size > 1e-9 else None
