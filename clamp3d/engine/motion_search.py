@@ -11,17 +11,17 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-DistanceAt = Callable[[float], tuple[float, float]]
-"""Lower and upper bound (mm) of the distance at a time."""
+DistanceAt = Callable[[float, float], tuple[float, float]]
+"""Lower and upper bound (mm) of the distance at a time, and how far (mm) it can change in the time it is asked for."""
 BoundBetween = Callable[[float, float], float]
 """Lower bound (mm) of the distance between two times."""
+Spent = Callable[[], float]
+"""The share of its budget of work that a search has spent: at 1 it ends."""
 
 ACCURACY = 1e-6
 """Default accuracy of a search, mm."""
-MOST = 20_000
-"""Default number of times at which a search asks for the distance."""
 SHARPENING = 0.04
-"""Share of that number after which bounds that are sharp enough end a search."""
+"""Share of its budget after which bounds that are sharp enough end a search."""
 
 
 class Least(NamedTuple):
@@ -46,13 +46,15 @@ def bound_by_speed(at_start: float, at_stop: float, way: float) -> float:
     """Lower bound of a distance between two times, ``at_start`` and ``at_stop`` mm at these.
 
     Lemma: a distance changes no faster than the fastest point of the moving body moves. On a way of ``way`` mm it is at
-    least ``at_start - x`` and ``at_stop - (way - x)`` after x mm, and the larger of the two is no less than their mean
-    (but for the rounding of these numbers).
+    least ``at_start - x`` and ``at_stop - (way - x)`` after x mm, and the larger of the two is no less than their mean,
+    nor than either at its far end (but for the rounding of these numbers).
 
     >>> bound_by_speed(3.0, 2.0, 4.0)
     0.5
+    >>> bound_by_speed(9.0, -math.inf, 4.0)
+    5.0
     """
-    return 0.5 * (at_start + at_stop - way)
+    return max(0.5 * (at_start + at_stop - way), max(at_start, at_stop) - way)
 
 
 def least(
@@ -61,7 +63,7 @@ def least(
     *,
     bound: BoundBetween | None = None,
     accuracy: float = ACCURACY,
-    most: int = MOST,
+    spent: Spent = lambda: 0.0,
     is_enough: Callable[[float, float], bool] = lambda lower, upper: False,
 ) -> Least:
     """Find the least distance between the times 0 and 1.
@@ -69,39 +71,39 @@ def least(
     Parameters
     ----------
     distance : callable
-        Lower and upper bound (mm) of the distance at a time.
+        Lower and upper bound (mm) of the distance at a time. Its other argument is how far (mm) the distance can change
+        between there and the ends of the stretch: where it is greater by that, it needs no sharp bounds.
     speed : float
         How fast it changes at most, mm per unit of time.
     bound : callable, optional
         Another lower bound (mm) between two times, asked for where the speed does not decide.
     accuracy : float
         How far the bounds of the answer may be apart, mm, besides those of ``distance``.
-    most : int
-        How often ``distance`` is asked; the bounds are further apart where that is not enough.
+    spent : callable, optional
+        The share of its budget that the search has spent; the bounds are further apart where that is not enough, as it
+        is where those of ``distance`` are.
     is_enough : callable, optional
-        Whether bounds (mm) of the answer are sharp enough, so that a share of ``most`` (`SHARPENING`) ends the search.
+        Whether bounds (mm) of the answer are sharp enough, so that `SHARPENING` of the budget ends the search.
 
     Examples
     --------
-    >>> answer = least(lambda t: (abs(t - 0.25),) * 2, 1.0, accuracy=1e-9)
+    >>> answer = least(lambda t, way: (abs(t - 0.25),) * 2, 1.0, accuracy=1e-9)
     >>> answer.t, answer.lower, answer.upper
     (0.25, 0.0, 0.0)
     """
-    start, stop = distance(0.0), distance(1.0)
+    start, stop = distance(0.0, speed), distance(1.0, speed)
     t, upper = (0.0, start[1]) if start[1] <= stop[1] else (1.0, stop[1])
     heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
-    for evaluations in range(2, most):
-        if not heap or heap[0].lower >= upper - accuracy:
-            break
-        if evaluations >= SHARPENING * most and is_enough(min(heap[0].lower, lower), upper):
+    while heap and heap[0].lower < upper - accuracy and spent() < 1.0:
+        if spent() >= SHARPENING and is_enough(min(heap[0].lower, lower), upper):
             break
         stretch = heapq.heappop(heap)
         middle = _meeting(stretch, speed)
         if not stretch.start < middle < stretch.stop:
             lower = min(lower, stretch.lower)
             continue
-        here = distance(middle)
+        here = distance(middle, _way(stretch, middle, speed))
         if here[1] < upper:
             t, upper = middle, here[1]
         for half in _halves(stretch, middle, here[0]):
@@ -116,7 +118,7 @@ def first_time(
     *,
     bound: BoundBetween | None = None,
     accuracy: float = ACCURACY,
-    most: int = MOST,
+    spent: Spent = lambda: 0.0,
 ) -> float | None:
     """Find the first time between 0 and 1 at which the distance is at most ``level`` mm; None if it never is.
 
@@ -126,24 +128,23 @@ def first_time(
 
     Examples
     --------
-    >>> round(first_time(lambda t: (1.0 - t,) * 2, 1.0, 0.25), 5)
+    >>> round(first_time(lambda t, way: (1.0 - t,) * 2, 1.0, 0.25), 5)
     0.75
     """
-    at_start, _ = distance(0.0)
+    at_start, _ = distance(0.0, speed)
     if at_start <= level:
         return 0.0
-    todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0)[0])]
-    evaluations = 2
+    todo = [_Stretch(-math.inf, 0.0, 1.0, at_start, distance(1.0, speed)[0])]
     while todo:
         stretch = _bounded(todo.pop(), speed, bound, level)
         if stretch.lower > level:
             continue
         middle = 0.5 * (stretch.start + stretch.stop)
         is_short = (stretch.stop - stretch.start) * speed <= accuracy or not stretch.start < middle < stretch.stop
-        if is_short or evaluations >= most:
+        if is_short or spent() >= 1.0:
             return stretch.start
-        evaluations += 1
-        todo += reversed(_halves(stretch, middle, distance(middle)[0]))
+        here, _ = distance(middle, _way(stretch, middle, speed))
+        todo += reversed(_halves(stretch, middle, here))
     return None
 
 
@@ -159,6 +160,11 @@ def _bounded(stretch: _Stretch, speed: float, bound: BoundBetween | None, enough
 def _halves(stretch: _Stretch, middle: float, here: float) -> tuple[_Stretch, _Stretch]:
     """Both parts of a stretch, with what is known of the whole; ``here``: lower bound at the time between them."""
     return stretch._replace(stop=middle, at_stop=here), stretch._replace(start=middle, at_start=here)
+
+
+def _way(stretch: _Stretch, middle: float, speed: float) -> float:
+    """How far (mm) the distance can change between a time in a stretch and its ends."""
+    return speed * max(middle - stretch.start, stretch.stop - middle)
 
 
 def _meeting(stretch: _Stretch, speed: float) -> float:

@@ -29,7 +29,7 @@ class MovingInGroove(MovingPair):
         self, groove: SweptArc, cylinder: AnyCylinder, motion: Motion, start: Array, resolution: float | None
     ) -> None:
         self.groove, self.cylinder, self.motion, self.start = groove, cylinder, motion, start
-        self.evaluations = 0
+        self.evaluations = self.work = 0
         offsets = float(np.abs([start[:3, 3], motion.travel, motion.angle * motion.point]).max())
         rounding = _ROUNDING * max(offsets, cylinder.length, groove.length) * (1.0 + abs(motion.angle))
         self.accuracy = max(ACCURACY if resolution is None else positive("resolution", resolution), rounding)
@@ -46,6 +46,7 @@ class MovingInGroove(MovingPair):
 
     def at(self, t: float, enough: Enough) -> Distance:
         """Distance at time ``t``: always as sharp as it gets."""
+        self.work += 1
         return kernel_distance(self.contact(t))
 
     def as_seen(self, distance: Distance, t: float) -> Distance:

@@ -8,7 +8,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model, box_corners
-from clamp3d.engine.motion_search import first_time, least
+from clamp3d.engine.motion_search import Spent, first_time, least
 from clamp3d.engine.refine import Enough, from_boxes, refine, with_normal
 from clamp3d.engine.swept import swept_lower
 from clamp3d.engine.verdict import Thresholds, Verdict
@@ -19,8 +19,10 @@ ACCURACY = 1e-6
 """A first contact and a least distance are searched to within this (mm), or to what the models give."""
 CHECKED = 1e-4
 """The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
-MOST = 5000
-"""Times at which a pair is looked at most, in one search: with meshes about a second."""
+BUDGET = 5000
+"""Work of one search, in evaluations by closed forms or meshes, which take about a millisecond."""
+_HEAVY = 50
+"""How many of those one by Open CASCADE counts for, or one that needs the common part of two meshes."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
 
@@ -41,6 +43,7 @@ class MovingPair:
         self.motion, self.start, self.back = motion, start, inverse(T_still)
         self.speed = motion.speed(to_target(start, box_corners(moving.bounds)))
         self.evaluations = 0
+        self.work = 0
         self._uninformative = 0
 
     def pose(self, t: float) -> Array:
@@ -51,7 +54,15 @@ class MovingPair:
         """Distance at time ``t``, refined until ``enough``."""
         self.evaluations += 1
         T = self.pose(t)
-        return refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
+        distance = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
+        is_heavy = distance.level == "exact" or (distance.level == "meshes" and distance.lower <= 0.0)
+        self.work += _HEAVY if is_heavy else 1
+        return distance
+
+    def budget(self) -> Spent:
+        """A new budget of work for a search."""
+        start = self.work
+        return lambda: (self.work - start) / BUDGET
 
     def as_seen(self, distance: Distance, t: float) -> Distance:
         """A distance at time ``t`` as the standing shape sees it, where that stands in the origin."""
@@ -79,9 +90,9 @@ class MovingPair:
         accuracy = self.accuracy if thresholds is None else CHECKED
         best, t_best, overlaps = Distance(), 0.0, 0
 
-        def distance(t: float) -> tuple[float, float]:
+        def distance(t: float, way: float) -> tuple[float, float]:
             nonlocal best, t_best, overlaps
-            here = self._sharp(t, best.upper, accuracy, thresholds)
+            here = self._sharp(t, best.upper + way, accuracy, thresholds)
             if here.upper < best.upper:
                 best, t_best = here, t
                 if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
@@ -95,33 +106,36 @@ class MovingPair:
             verdict = thresholds and thresholds.verdict(Distance(lower, upper), allowance)
             return verdict not in (None, Verdict.UNCERTAIN)
 
+        spent = self.budget()
         try:
-            bounds = least(distance, self.speed, bound=self.between, accuracy=accuracy, most=MOST, is_enough=is_certain)
+            bounds = least(
+                distance, self.speed, bound=self.between, accuracy=accuracy, spent=spent, is_enough=is_certain
+            )
         except _CertainError:
             return replace(best, lower=-np.inf), t_best
         return replace(best, lower=min(bounds.lower, best.upper)), t_best
 
-    def _sharp(self, t: float, best: float, accuracy: float, thresholds: Thresholds | None) -> Distance:
-        """The distance at ``t``, refined as far as it can matter: known, deep enough, or above the ``best`` so far."""
+    def _sharp(self, t: float, most: float, accuracy: float, thresholds: Thresholds | None) -> Distance:
+        """The distance at ``t``, refined as far as it can matter: known, deep enough, or more than ``most`` mm."""
 
         def enough(distance: Distance) -> bool:
-            if distance.upper - distance.lower <= 0.5 * accuracy or distance.lower >= best + self.speed:
+            if distance.upper - distance.lower <= 0.5 * accuracy or distance.lower >= most:
                 return True
             if thresholds is None:  # of an overlap nothing is searched that the distance at one time does not tell
                 return distance.upper < -ACCURACY
-            return thresholds.verdict(distance) is Verdict.CLASH
+            return thresholds.verdict(distance) in (Verdict.CLASH, Verdict.CONTACT)
 
         return self.at(t, enough)
 
     def first_time(self, level: float) -> float | None:
         """Everything before this time is proven to be further apart than ``level`` mm; None if all of the way is."""
 
-        def distance(t: float) -> tuple[float, float]:
+        def distance(t: float, way: float) -> tuple[float, float]:
             def enough(distance: Distance) -> bool:
                 width = distance.upper - distance.lower
-                return width <= 0.5 * self.accuracy or distance.lower > level + self.speed or distance.upper <= level
+                return width <= 0.5 * self.accuracy or distance.lower > level + way or distance.upper <= level
 
             here = self.at(t, enough)
             return here.lower, here.upper
 
-        return first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, most=MOST)
+        return first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, spent=self.budget())

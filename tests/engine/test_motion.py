@@ -125,7 +125,7 @@ def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screw
 
 def test_what_the_models_leave_open_at_the_nearest_time_is_not_searched_for_elsewhere(monkeypatch):
     """0.01 mm apart at the start, known to 0.05: no more steps tell whether they touch."""
-    monkeypatch.setattr(moving_pair, "MOST", 300)
+    monkeypatch.setattr(moving_pair, "BUDGET", 300)
     mesh = trimesh.creation.icosphere(1, 10.0)
     ball = mesh_shape(mesh, error=0.05)
     motion = Motion.screw((0.3, 0.1, 1.0), 1.6, point=(0.0, 60.0, 0.0), parts=("ball",))

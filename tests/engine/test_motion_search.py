@@ -10,7 +10,7 @@ times = st.floats(0.0, 1.0)
 
 
 def exactly(f):
-    return lambda t: (f(t), f(t))
+    return lambda t, way: (f(t), f(t))
 
 
 @given(st.lists(st.tuples(times, st.floats(-2.0, 5.0)), min_size=1, max_size=6), times, times)
@@ -21,8 +21,9 @@ def test_bound_by_speed_is_below_every_distance_of_that_speed(peaks, start, stop
     def f(t):
         return min(v + 3.0 * abs(t - p) for p, v in peaks)
 
-    low = bound_by_speed(f(start), f(stop), 3.0 * (stop - start))
-    assert all(f(start + k / 50.0 * (stop - start)) >= low - 1e-12 for k in range(51))
+    for at_start, at_stop in ((f(start), f(stop)), (-9.0, f(stop)), (f(start), -9.0)):  # nothing is known of the end
+        low = bound_by_speed(at_start, at_stop, 3.0 * (stop - start))
+        assert all(f(start + k / 50.0 * (stop - start)) >= low - 1e-12 for k in range(51))
 
 
 @given(st.lists(st.tuples(times, st.floats(0.0, 5.0)), min_size=1, max_size=6))
@@ -40,11 +41,34 @@ def test_least_and_first_time_of_the_minimum_of_cones(peaks):
     assert first_time(exactly(f), 3.0, value - 1e-3) is None
 
 
+@given(st.lists(st.tuples(times, st.floats(0.0, 5.0)), min_size=1, max_size=6), st.floats(0.0, 2.0))
+def test_a_distance_that_is_large_enough_for_its_stretch_may_be_known_loosely(peaks, off):
+    value = min(v for _, v in peaks)
+
+    def f(t):
+        return min(v + abs(t - p) for p, v in peaks)
+
+    def measured(level):
+        def distance(t, way):
+            return (f(t) - off, f(t) + off) if f(t) - off > level + way else (f(t), f(t))
+
+        return distance
+
+    answer = least(measured(value), 3.0)
+    assert answer.upper - 1e-6 <= answer.lower <= value + 1e-12 <= answer.upper + 1e-11
+    first = first_time(measured(value + 0.5), 3.0, value + 0.5)
+    assert first == pytest.approx(first_time(exactly(f), 3.0, value + 0.5), abs=1e-6)
+
+
 def test_intervals_give_bounds_that_hold_and_first_times_that_are_never_late():
-    def between(t):
+    count = 0
+
+    def between(t, way):
+        nonlocal count
+        count += 1
         return abs(t - 0.5) - 0.01, abs(t - 0.5) + 0.02
 
-    answer = least(between, 1.0)
+    answer = least(between, 1.0, spent=lambda: count / 1000)
     assert answer.lower == pytest.approx(-0.01, abs=1e-6)
     assert answer.upper == pytest.approx(0.02, abs=1e-6)
     assert first_time(between, 1.0, 0.1) == pytest.approx(0.39, abs=2e-6)
@@ -57,7 +81,7 @@ class Counted:
     def __init__(self, value):
         self.value, self.times = value, 0
 
-    def __call__(self, t):
+    def __call__(self, t, way):
         self.times += 1
         return self.value, self.value
 
@@ -65,9 +89,9 @@ class Counted:
 def test_a_constant_distance_needs_a_bound_between_times_or_ends_undecided():
     assert first_time(Counted(0.01), 100.0, 0.0) is None
     near = Counted(1e-5)
-    assert 0.0 < first_time(near, 100.0, 0.0, most=500) < 1e-3
+    assert 0.0 < first_time(near, 100.0, 0.0, spent=lambda: near.times / 500) < 1e-3
     assert near.times == 500
-    wide = least(near, 100.0, most=500)
+    wide = least(near, 100.0, spent=lambda: (near.times - 500) / 500)
     assert wide.lower < 0.0 < wide.upper
     assert near.times == 1000
     bounded = Counted(1e-5)

@@ -69,7 +69,7 @@ def tube():
 
 
 def test_what_goes_through_an_open_mesh_is_not_said_to_be_clear_on_the_way(monkeypatch):
-    monkeypatch.setattr(moving_pair, "MOST", 300)
+    monkeypatch.setattr(moving_pair, "BUDGET", 300)
     scene = Scene().add("tube", tube()).add("bead", shapes.box((3, 3, 3)), translation(0.3, 0.2, -900.0))
     go = Motion.translate((0.0, 0.0, -1000.0), parts="tube")
     assert check(replace(scene, motions=(go,))).motions[0].verdict.value == "uncertain"

@@ -62,7 +62,7 @@ def test_turns_that_are_carried_across_their_axis(seed):
 @settings(SLOW, max_examples=5)
 @given(st.sampled_from(DRAWN + FACETED), st.sampled_from(DRAWN), ways, poses(25.0))
 def test_least_distances_and_first_contacts(monkeypatch, a, b, way, start):
-    monkeypatch.setattr(moving_pair, "MOST", 500)
+    monkeypatch.setattr(moving_pair, "BUDGET", 500)
     assert_motion(min_clearance(a, b, way, start), a, b, way, start, tolerance=1e-5, cells=1500, times=5)
     assert_motion(first_contact(a, b, way, start), a, b, way, start, first=True, tolerance=1e-5, cells=1500, times=5)
 
