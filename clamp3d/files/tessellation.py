@@ -17,7 +17,14 @@ ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
 
 SAMPLED = 2.0
-"""Factor on the deviation measured at the edges' middles of splines; 4/3 is enough where the surface is quadratic."""
+"""Factor on the deviation measured at places of splines; 4/3 is enough at the edges' middles of a quadratic surface."""
+_SHARES = np.array([0.25, 0.5, 0.75])
+"""Where a border is looked at between two points: a curve that is odd about the chord's middle passes through it."""
+_PLACES = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i) if 4 not in (i, j, 4 - i - j)]) / 4.0
+"""Barycentric coordinates (12, 3) of the places where a spline's triangle is looked at: on its edges and between.
+
+A crowned face with straight borders is four times as far from a triangle between its edges as at their middles.
+"""
 
 _FACTORS = np.array([1.0, 1.0, 2.0, 1.4, 1.4, SAMPLED])
 """The same by kind of surface. On a cylinder, as on a circle, nothing is further than such a middle; on spheres and
@@ -30,7 +37,7 @@ _FINER = (1.0, 4.0, 16.0)
 _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
-"""About how many places of a spline are looked at besides its triangles' edges."""
+"""About how many places of a spline are looked at besides those of each triangle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,15 +119,21 @@ def points_on(face: Any, uv: Array) -> Array:
 
 
 def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntArray, uv: Array) -> Array:
-    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `_FACTORS`."""
-    kind, (middles, at) = int(form.kind[k]), (_middles(x[triangles]) for x in (points, uv))
+    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `_FACTORS`.
+
+    Splines are looked at in more places, on the edges and between.
+    """
+    kind = int(form.kind[k])
     if kind == OTHER:
-        true, corner = points_on(face, at.reshape(-1, 2)), 0.0
-        off = np.linalg.norm(closest_points(np.repeat(points[triangles], 3, axis=0), true) - true, axis=1)
+        at = _PLACES @ uv[triangles]
+        every, row = np.unique(at.reshape(-1, 2) @ (1.0, 1.0j), return_inverse=True)
+        true, corner = points_on(face, np.column_stack([every.real, every.imag]))[row.reshape(-1)], 0.0
+        off = np.linalg.norm(closest_points(np.repeat(points[triangles], len(_PLACES), axis=0), true) - true, axis=1)
     else:
+        middles = _middles(points[triangles])
         off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
         corner = float(heights.max())
-    return np.asarray(_FACTORS[kind] * off.reshape(-1, 3).max(axis=1) + corner)
+    return np.asarray(_FACTORS[kind] * off.reshape(len(triangles), -1).max(axis=1) + corner)
 
 
 def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Array) -> Array:
@@ -187,9 +200,13 @@ def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
             continue
         count = range(1, polygon.NbNodes() + 1)
         nodes, at = np.array([polygon.Node(i) - 1 for i in count]), np.array([polygon.Parameter(i) for i in count])
-        true = np.array([curve.Value(t).Coord() for t in (0.5 * (at[:-1] + at[1:])).tolist()])
-        factor = 1.0 if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle else SAMPLED
-        sags = factor * np.linalg.norm(true - 0.5 * (points[nodes[:-1]] + points[nodes[1:]]), axis=1)
+        is_circle = curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle
+        factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
+        times = at[:-1, None] + np.diff(at)[:, None] * shares
+        true = np.array([curve.Value(t).Coord() for t in times.reshape(-1).tolist()]).reshape(*times.shape, 3)
+        ends = points[nodes]
+        chords = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * shares[:, None]
+        sags = factor * np.linalg.norm(true - chords, axis=2).max(axis=1)
         sag_of.update(zip(_edge_keys(nodes[:-1], nodes[1:]).tolist(), sags.tolist(), strict=True))
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))

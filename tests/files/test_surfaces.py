@@ -175,6 +175,44 @@ def test_no_bump_of_a_spline_is_overlooked(count, at, offset):
     assert (np.sqrt(away) <= made.errors[row] + 0.01).all()  # where a knot is inside a triangle twice is not enough
 
 
+def patch(heights):
+    """A face over 20 x 20 mm whose heights are a polynomial, by its Bezier poles (n, m)."""
+    try:
+        from OCP.collections import Array2_gp_Pnt as Points
+    except ModuleNotFoundError:
+        from OCP.TColgp import TColgp_Array2OfPnt as Points
+    count = np.array(np.shape(heights))
+    poles = Points(1, int(count[0]), 1, int(count[1]))
+    for index in np.ndindex(*count):
+        x, y = (20.0 * np.array(index) / (count - 1)).tolist()
+        poles.SetValue(index[0] + 1, index[1] + 1, gp_Pnt(x, y, float(heights[index])))
+    surface = faces.occ.Geom_BezierSurface(poles)
+    return surface, faces.occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
+
+
+CROWN = np.outer([0.0, 2.0, 0.0], [0.0, 1.2, 0.0])
+"""0.6 mm high in the middle, with straight borders."""
+WAVE = np.outer([0.0, 0.1, -0.1, 0.0], [1.0, 1.0])
+"""Passes through the middle of its chord; also along its borders."""
+
+
+@pytest.mark.parametrize("heights", [CROWN, WAVE, 0.3 * WAVE, CROWN + CROWN.T])
+def test_a_face_is_as_near_to_its_triangles_as_said_between_the_middles_of_their_edges(heights):
+    surface, face = patch(heights)
+    made = tessellate(to_bytes(face), 0.1)
+    true = np.array([surface.Value(u, v).Coord() for u in np.linspace(0, 1, 41) for v in np.linspace(0, 1, 41)])
+    away, row, _ = point_mesh_squared_distance(true, made.vertices, made.faces)
+    assert (np.sqrt(away) <= made.errors[row] + 1e-9).all()
+
+
+def test_a_pin_that_stands_in_a_crowned_face_clashes(tmp_path):
+    """Between their edges the coarse triangles of the face are 0.15 mm off it."""
+    plate = BRepPrimAPI_MakePrism(patch(CROWN)[1], gp_Vec(0.0, 0.0, -5.0)).Shape()
+    parts = {"plate": plate, "pin": block((4.95, 9.95, 0.4), (5.05, 10.05, 8.0))}  # the face is at 0.45 mm there
+    (row,) = check(load(write_step(parts, tmp_path / "crown.step")), depths=False).pairs
+    assert row.verdict is Verdict.CLASH
+
+
 def test_a_bump_that_stands_in_another_part_clashes(tmp_path):
     """Open CASCADE's own distance says that plate and lid are 0.09 mm apart: it leaves out the bump."""
     face = faces.occ.BRepBuilderAPI_MakeFace(faces.occ.Geom_OffsetSurface(bumpy(81, (29, 51), 2.0), 1.0), 1e-7).Face()
