@@ -27,7 +27,11 @@ _OTHERS = re.compile(
     "CSG_SOLID|(EXTRUDED|REVOLVED)_AREA_SOLID|SWEPT_FACE_SOLID|SOLID_REPLICA|TESSELLATED_(SOLID|SHELL)"
 )
 """Bodies that Open CASCADE does not make into solids."""
-_FAULT = re.compile("Parsing|Unresolved")
+_FAULT = re.compile(
+    r"Parsing|Unresolved|not a Real|\((transform_item_[12]|location|axis|ref_direction)\)|"
+    r"Count of Parameters is not \d+ for (axis2|cartesian|direction|item_defined)"
+)
+"""What Open CASCADE says of numbers and places that it then takes to be 0, or leaves out."""
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 
