@@ -10,11 +10,15 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from clamp3d.errors import InputError
 
 _NOISE = re.compile(r"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
 _RECORD = re.compile(r"#\s*0*(\d+)\s*=\s*([^;]+)")
 _TYPES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
+_OPERATOR = "CARTESIAN_TRANSFORMATION_OPERATOR_3D"
+_NUMBER = re.compile(r"-?\d[\d.]*(?:E[-+]?\d+)?", re.IGNORECASE)
 _REFERENCE = re.compile(r"#\s*0*(\d+)(?!\d|\s*=)")
 _FILE = re.compile(r"DOCUMENT_FILE\s*\(\s*'([^']+\.(?:stp|step))'", re.IGNORECASE)
 _PARTS = re.compile(
@@ -29,12 +33,12 @@ _PARTS = re.compile(
 class Announced:
     """What a STEP file says it holds.
 
-    ``counts``: entities by their type in capitals. ``orphans``: entities that nothing refers to, but should, in words.
-    ``files``: names of other STEP files that hold its parts.
+    ``counts``: entities by their type in capitals. ``lost``, in words: entities that nothing refers to, but should, and
+    placements that mirror, of which Open CASCADE makes turns. ``files``: names of other STEP files that hold its parts.
     """
 
     counts: Counter[str]
-    orphans: tuple[str, ...]
+    lost: tuple[str, ...]
     files: tuple[str, ...]
 
 
@@ -50,13 +54,36 @@ def announced(path: Path) -> Announced:
         number: _TYPES.findall(content) if content[0] == "(" else [content.partition("(")[0].rstrip()]
         for number, content in records
     }
+    contents = dict(records)
     unused = types.keys() - set(_REFERENCE.findall(text))
     return Announced(
         Counter(kind for kinds in types.values() for kind in kinds),
-        tuple(
-            f"{kinds[0]} (#{number}) that belongs to nothing"
-            for number, kinds in types.items()
-            if number in unused and kinds and _PARTS.fullmatch(kinds[0])
+        (
+            *(
+                f"{kinds[0]} (#{number}) that belongs to nothing"
+                for number, kinds in types.items()
+                if number in unused and kinds and _PARTS.fullmatch(kinds[0])
+            ),
+            *(
+                f"{_OPERATOR} (#{number}), a placement that mirrors"
+                for number, kinds in types.items()
+                if kinds == [_OPERATOR] and _mirrors(contents[number], contents)
+            ),
         ),
         tuple(_FILE.findall(raw)),
     )
+
+
+def _mirrors(operator: str, contents: dict[str, str]) -> bool:
+    """Whether the axes of a CARTESIAN_TRANSFORMATION_OPERATOR_3D are left-handed (ISO 10303-42).
+
+    Its last arguments are axis 1, axis 2, origin, scale and axis 3; an axis that is left out is that of the frame.
+    """
+    arguments = operator.rstrip(" )\r\n").split(",")
+    axes = np.eye(3)
+    for k, argument in enumerate(arguments[-5:-3] + arguments[-1:]):
+        if number := _REFERENCE.search(argument):
+            numbers = _NUMBER.findall(contents.get(number[1], "").partition(",")[2])
+            if len(numbers) == len(axes):
+                axes[k] = [float(x) for x in numbers]
+    return bool(np.linalg.det(axes) < 0.0)

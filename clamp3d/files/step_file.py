@@ -142,7 +142,7 @@ def _lost(products: list[Any], contents: list[Announced]) -> Iterator[str]:
     """Bodies and instances that the files announce and Open CASCADE has not made."""
     counts: Counter[str] = Counter()
     for content in contents:
-        yield from content.orphans
+        yield from content.lost
         counts += content.counts
     for kind, count in counts.items():
         if _OTHERS.fullmatch(kind):

@@ -126,6 +126,7 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
     kind = int(form.kind[k])
     if kind == OTHER:
         at = _PLACES @ uv[triangles]
+        # Triangles share places on their edges; pairs of numbers are sorted soonest as complex ones.
         every, row = np.unique(at.reshape(-1, 2) @ (1.0, 1.0j), return_inverse=True)
         true, corner = points_on(face, np.column_stack([every.real, every.imag]))[row.reshape(-1)], 0.0
         off = np.linalg.norm(closest_points(np.repeat(points[triangles], len(_PLACES), axis=0), true) - true, axis=1)

@@ -1,5 +1,6 @@
 """STEP assemblies against what Open CASCADE wrote: names, placements, instances, units, and nothing left out."""
 
+import re
 from contextlib import chdir
 
 import numpy as np
@@ -131,6 +132,31 @@ def test_a_text_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     else:
         with pytest.raises(InputError, match=message):
             load(path)
+
+
+@pytest.mark.parametrize(
+    ("axes", "mirrors"),
+    [
+        ("#900,#901,#903,1.,#902", True),
+        ("#900,#901,#903,1.,$", True),
+        ("#901,#900,#903,1.,#902", False),
+        ("$,$,#903,1.,$", False),
+    ],
+)
+def test_an_instance_that_is_mirrored_is_missing(tmp_path, axes, mirrors):
+    """Open CASCADE turns it by half a turn instead."""
+    path = nested(np.random.default_rng(7))[0].write(tmp_path / "machine.step")
+    operator = f"CARTESIAN_TRANSFORMATION_OPERATOR_3D('','',$,{axes});\n#903 = CARTESIAN_POINT('',(30.,0.,0.));\n"
+    directions = ("(-1.,0.,0.)", "(0.,1.,0.)", "(0.,0.,1.)")
+    operator += "".join(f"#{900 + k} = DIRECTION('',{values});\n" for k, values in enumerate(directions))
+    before = path.read_text()
+    assert "#900 " not in before
+    path.write_text(re.sub(r"ITEM_DEFINED_TRANSFORMATION\([^;]*;\s", operator, before, count=1))
+    if mirrors:
+        with pytest.raises(InputError, match=r"missing: .*OPERATOR_3D \(#\d+\), a placement that mirrors"):
+            load(path)
+    else:
+        assert len(load(path).parts) == 5
 
 
 @pytest.fixture
