@@ -13,6 +13,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeSolid
 from OCP.gp import gp_Ax3, gp_Sphere
 from OCP.TopoDS import TopoDS_Shell
 
+from clamp3d.engine import moving_pair
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
@@ -25,6 +26,7 @@ from clamp3d.files import boundary, cad_process, pairs
 from clamp3d.files.open_cascade import to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
+from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import to_target
 from tests.cad import ball, block, cone, cut, first_solid, moved, ring, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
@@ -261,3 +263,14 @@ def test_depths_of_points_are_those_from_a_fine_mesh(shape, turned):
     surface = Surface(mesh.vertices, mesh.faces)
     true = np.where(surface.contains(points), 1.0, -1.0) * surface.distance(points)
     np.testing.assert_allclose(found, true, atol=0.02)
+
+
+def test_a_search_that_needs_common_parts_ends_after_fewer_times(monkeypatch):
+    """A bar that slides along the inner edge of an angle touches it all the way; each time counts for fifty."""
+    monkeypatch.setattr(moving_pair, "BUDGET", 500)
+    angle = cut(block((-5, -5, -5), (5, 5, 5)), block((0, 0, -6), (6, 6, 6)))
+    bar, still = (model_of(BrepSolid.of(solid, "solid"), Counters()) for solid in (block((0, 0, -1), (2, 2, 1)), angle))
+    pair = moving_pair.MovingPair(bar, still, Motion.translate((0.0, 0.0, 4.0)), np.eye(4), np.eye(4))
+    least, _ = pair.least_distance(Thresholds())
+    assert pair.evaluations == 10
+    assert least.lower < -0.01 < -1e-6 <= least.upper <= 1e-6  # nothing is known of the times between
