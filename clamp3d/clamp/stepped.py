@@ -93,7 +93,8 @@ def solve_stepped(
         raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
     # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
     free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
-    return search.end(max(free, key=lambda p: float(section.gaps(p).value.min()), default=q))
+    q = max(free, key=lambda p: min(float(section.wire_gaps(p, wire).value.min()) for wire in WIRES), default=q)
+    return search.end(q)
 
 
 def solve_bisection(

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,9 @@ from clamp3d.clamp.assemble import TILT_STEP
 from clamp3d.clamp.conductors import catalogue
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
-from clamp3d.clamp.section import SIZE, D, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, D, S, Section
 from clamp3d.clamp.stepped import solve_bisection, solve_stepped
+from clamp3d.errors import SolverError
 from tests.clamp.random_clamps import whole_clamp
 
 
@@ -60,6 +62,49 @@ def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
         assert tried[-1][1] == pytest.approx(found.q[D], abs=1e-12)
         steps[resolution] = found.motion_steps
     assert steps[1e-3] > steps[0.05] > stepped.motion_steps
+
+
+@pytest.mark.parametrize("k", [0, 6, 10])
+def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_free(k):
+    """Down from the open clamp, each time at the free tilt next to the last one; at last at the one with most room."""
+    clamp, step, turn, told = whole_clamp(np.random.default_rng([41, k]), major=0.0), 2.0, math.radians(1.0), []
+    section, envelope, most = Section(clamp, Cas()), Envelope(clamp), math.floor(clamp.tilt_stop / turn)
+    turns = list(range(-most, most + 1))
+    least = envelope.faces(turn * np.array(turns))
+    for wire, name in zip(envelope.wires, WIRES, strict=True):
+        x = np.sort(np.clip(wire.places(turn * np.array(turns)), *section.mouth(name)), axis=1)
+        least = np.maximum(least, np.nanmin(wire.least(x, turn * np.array(turns)), axis=1))
+    expected, tried, last, d = [], 0, 0, step * math.ceil(section.open_distance() / step)
+    while min(least) <= d:
+        order = sorted(turns, key=lambda i: (abs(i - last), abs(i)))
+        count, last = next((n, i) for n, i in enumerate(order, 1) if least[i + most] <= d)
+        tried, d = tried + count, d - step
+        expected.append((tried, pytest.approx(d + step, abs=1e-9)))
+    found = solve_stepped(section, step=step, tilt_step=turn, progress=lambda *at: told.append(at))
+    assert told == expected
+    assert found.motion_steps == tried + len(turns)
+    assert k == 10 or found.q[S] == pytest.approx(section.lever * turn * turns[least.argmin()])  # 10: loose wires
+    assert found.q[D] == pytest.approx(d + step, abs=1e-9)
+    chords = solve_stepped(Section(clamp, Chords(0.5)), step=10.0, tilt_step=0.1)
+    gaps = [gap for gap, pair in zip(chords.gaps.value, chords.gaps.pair, strict=True) if pair == ("P2", "P3")]
+    assert min(gaps) == pytest.approx(0.0, abs=1e-9)  # the saddle is drawn up to its chords
+
+
+def test_moves_that_would_never_end_are_refused(clamp):
+    section = Section(clamp, Cas())
+    limits = {"step": section.open_distance() / 1e5, "tilt_step": clamp.tilt_stop / 1e5}
+    for name, limit in limits.items():
+        unit = f"{math.degrees(limit):.4g} deg" if name == "tilt_step" else f"{limit:.4g} mm"
+        moves = {"step": 1.0, "tilt_step": TILT_STEP}
+        with pytest.raises(InputError, match=rf"step must be >= {re.escape(unit)} here"):
+            solve_stepped(section, **moves | {name: 0.999 * limit})
+        with pytest.raises(InputError, match="step must be > 0"):
+            solve_stepped(section, **moves | {name: 0.0})
+        with pytest.raises(ZeroDivisionError):  # begins
+            solve_stepped(section, **moves | {name: 1.001 * limit}, progress=lambda *_: 1 // 0)
+    section.open_distance = lambda: 1.5
+    with pytest.raises(SolverError, match="the open clamp overlaps at a distance of 2 mm"):
+        solve_stepped(section, step=1.0, tilt_step=TILT_STEP)
 
 
 @pytest.mark.parametrize(("model", "aside"), [(Cas(), 0.0), (Cas(), 40.0), (Chords(math.radians(7.0)), 0.0)])
