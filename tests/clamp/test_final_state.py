@@ -15,12 +15,13 @@ from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.clamp.assemble import TILT_STEP
 from clamp3d.clamp.conductors import catalogue
+from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
-from clamp3d.clamp.section import SIZE, WIRES, D, S, Section
+from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
 from clamp3d.clamp.stepped import solve_bisection, solve_stepped
 from clamp3d.errors import SolverError
-from tests.clamp.random_clamps import whole_clamp
+from tests.clamp.random_clamps import changed, whole_clamp
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +118,28 @@ def test_gradients_agree_with_differences(clamp, model, aside):
         q[[0, 2]] += -aside, aside
         numeric = [(section.gaps(q + h * e).value - section.gaps(q - h * e).value) / (2.0 * h) for e in np.eye(SIZE)]
         assert np.allclose(np.array(numeric).T, section.gaps(q).gradient, atol=2e-6)
+
+
+@pytest.mark.parametrize("plays", [(), ("hole",), ("saddle",), ("washer",), ("hole", "saddle", "washer")])
+def test_gaps_of_the_section_are_those_of_the_bodies_in_space(plays):
+    """Wires, bolt, slot, hole, saddle of tilted and shifted parts; the bolt is pushed off the saddle's bottom."""
+    rng, joints = np.random.default_rng(7), Joints(**dict.fromkeys(plays, True))
+    clamp = replace(changed(whole_clamp(rng), {"down_splint.slot_length": 55.0}), joints=joints)
+    section = Section(clamp, Cas())
+    for tilt in (0.06, -0.06):
+        q = section.open_state(section.open_distance(), tilt)
+        q[:4] += rng.uniform(-1.0, 1.0, 4)
+        q[[D, U]] += 3.0
+        q[[B, V, W]] += np.array([0.2, -0.1, -2.5 * np.sign(tilt)]) * [joints.hole, joints.washer, joints.saddle]
+        gaps, poses = section.gaps(q), section.poses(q)
+        poses["P4"] = replace(poses["P4"], y=poses["P4"].y + 5.0)
+        pairs = sorted({*gaps.pair, ("P1", "P4"), ("P3", "P4")} - {("P1", "P2")})
+        for contact in measure_contacts(clamp, poses, pairs=pairs):
+            pair = contact.a, contact.b
+            idle = clamp.up_splint.hole_diameter if "P1" in pair else clamp.saddle.hole_diameter
+            own = [gap for gap, its in zip(gaps.value, gaps.pair, strict=True) if its == pair]
+            least = min(own, default=0.5 * (idle - clamp.bolt.diameter))
+            assert contact.gap == pytest.approx(least, abs=1e-6), pair
 
 
 def test_a_state_is_what_its_poses_say(clamp):
