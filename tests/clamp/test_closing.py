@@ -1,6 +1,7 @@
 """The closing path: one answer in every command, stops that are there, play, forces and their virtual work."""
 
-from dataclasses import replace
+import math
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
@@ -119,3 +120,46 @@ def test_closing_begins_where_the_path_has_been(run):
         states.append([down.y - up.y, down.angle - up.angle, *places])
     off = np.abs(np.array(states) - [start.closing, start.tilt, *start.line, *start.jumper]).max(axis=1)
     assert off.min() < 1e-9
+
+
+@pytest.mark.parametrize(("k", "plays"), [(None, False), (8, True)])
+def test_a_mirrored_clamp_ends_in_the_mirrored_state(k, plays):
+    clamp = load_clamp() if k is None else whole_clamp(np.random.default_rng([61, k]))
+    clamp = replace(clamp, joints=Joints(hole=plays, saddle=plays, washer=plays))
+    other = {"line": clamp.jumper, "jumper": clamp.line}
+    for splint in ("up_splint", "down_splint"):
+        own = getattr(clamp, splint)
+        other |= {f"{splint}.line_groove": own.jumper_groove, f"{splint}.jumper_groove": own.line_groove}
+    words, states = [], []
+    for run, side in ((assemble(clamp), 1.0), (assemble(changed(clamp, other)), -1.0)):
+        text, left = str.maketrans("67", "67" if side > 0.0 else "76"), run.poses["P1"].x + 0.5 * clamp.up_splint.width
+        forces = {f"{f.a}{f.b} {f.feature.split()[0]}".translate(text): f for f in run.forces}
+        seats = [f"{s.splint}{s.wire} {s.detail}".translate(text) for s in run.seats]
+        words.append((run.status.translate(text), sorted(forces), sorted(seats)))
+        states.append([run.closing, side * run.tilt, *(side * (run.poses[p].x - left) for p in ("P2", "P3", "P4"))])
+        for _, f in sorted(forces.items()):
+            states[-1] += [f.force, side * f.direction[0], f.direction[2], side * (f.point[0] - left)]
+    assert words[0] == words[1]
+    assert states[0] == pytest.approx(states[1], abs=1e-8)
+
+
+def scaled(part, by):
+    """A clamp's part with all lengths times ``by``."""
+    sizes = {f.name: getattr(part, f.name) for f in fields(part) if not f.name.endswith("_deg")}
+    new = {key: by * size for key, size in sizes.items() if isinstance(size, float)}
+    return replace(part, **new, **{key: scaled(size, by) for key, size in sizes.items() if is_dataclass(size)})
+
+
+def test_a_scaled_clamp_closes_as_far_in_its_own_lengths():
+    """Only where it begins is not to scale: open by 10 mm more than it must be, or a fifth of its half width."""
+    clamp = load_clamp(line=32.67, jumper=14.25)
+    base, small = (assemble(clamp if by == 1.0 else scaled(clamp, by), others=True) for by in (1.0, 0.1))
+    assert base.start.closing == pytest.approx(27.726 - 24.5505 + 32.67 + 68.5 * math.sin(clamp.tilt_stop) + 10.0)
+    assert 10.0 * small.start.closing == pytest.approx(base.start.closing - 10.0 + 0.2 * 68.5)
+    lengths = [
+        [run.distance, run.closing, *(e.distance for e in run.others), *(p.distance for p in run.with_play)]
+        for run in (base, small)
+    ]
+    assert 10.0 * np.array(lengths[1]) == pytest.approx(lengths[0], abs=1e-9)
+    travels = [event.travel for event in base.events[2:]]
+    assert [10.0 * event.travel - 0.2 * 68.5 + 10.0 for event in small.events[2:]] == pytest.approx(travels, abs=1e-4)
