@@ -271,7 +271,7 @@ class Section:
             for low, high in (self.mouth(wire), self.reach(wire)):
                 q[2 * i] = min(max(q[2 * i], low), high)
             r, face = self.pairs["P1", wire].cylinder.radius, self.clamp.down_splint.face_depth
-            under = down.point((q[2 * i] - down.x) / math.cos(down.angle), face)[1]
+            under = down.y + (face - (q[2 * i] - down.x) * math.sin(down.angle)) / math.cos(down.angle)
             low, high = self.clamp.up_splint.thickness + r, under - r / math.cos(down.angle)
             if low <= high:
                 q[2 * i + 1] = min(max(q[2 * i + 1], low), high)

@@ -12,7 +12,7 @@ from clamp3d.baselines import Cas
 from clamp3d.clamp.dimensions import GrooveDimensions, Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
-from clamp3d.clamp.section import EDGES, D, Section, U, W
+from clamp3d.clamp.section import EDGES, WIRES, D, Section, U, W
 from tests.clamp.outlines import Outlines
 from tests.clamp.random_clamps import changed, check_clamps, whole_clamp
 
@@ -29,9 +29,16 @@ def test_the_open_clamp_overlaps_nothing_at_any_tilt():
     for k in range(60):
         section = Section(whole_clamp(np.random.default_rng([9, k])), Cas())
         for tilt in section.clamp.tilt_stop * np.linspace(-1.0, 1.0, 5):
-            gaps = section.gaps(section.open_state(section.open_distance(), tilt))
+            q = section.open_state(section.open_distance(), tilt)
+            gaps, down, clamp = section.gaps(q), section.down_splint(q), section.clamp
             apart = [gap for gap, pair in zip(gaps.value, gaps.pair, strict=True) if pair != ("P2", "P3")]
             assert min(apart) >= -1e-9, k
+            for (x, y), wire in zip(q[:4].reshape(2, 2), WIRES, strict=True):  # no further from their middle than that
+                low = (x - down.x) * math.sin(down.angle) + (y - down.y) * math.cos(down.angle)
+                room = min(y - clamp.up_splint.thickness, clamp.down_splint.face_depth - low)
+                middle = 0.5 * np.add(*section.arc_centres(q, wire))
+                assert x in (middle[0], *section.mouth(wire), *section.reach(wire))
+                assert y == middle[1] or room == pytest.approx(section.pairs["P1", wire].cylinder.radius)
 
 
 def test_inner_faces_are_as_far_apart_as_their_lines():
