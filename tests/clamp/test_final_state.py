@@ -142,6 +142,24 @@ def test_gaps_of_the_section_are_those_of_the_bodies_in_space(plays):
             assert contact.gap == pytest.approx(least, abs=1e-6), pair
 
 
+def test_where_wires_begin_and_where_they_escape_by_hand(clamp):
+    section = Section(clamp, Cas())
+    half = math.sqrt(23.8012**2 - (48.7901 - 27.726) ** 2)
+    for wire, middle in (("P6", 68.5 - 46.0349), ("P7", 68.5 + 49.8315)):
+        assert section.mouth(wire) == pytest.approx((middle - half, middle + half))
+    assert section.reach("P6") == pytest.approx((-16.335, 68.5 - 10.0 - 16.335))
+    assert section.reach("P7") == pytest.approx((68.5 + 10.0 + 7.125, 137.0 + 7.125))
+    assert section.least_slack == pytest.approx(23.8012 - 16.335)
+    for aside, low, high in ((0.0, 0.0, 137.0), (2.0, 2.0, 137.0), (-2.0, 0.0, 135.0)):  # of the down splint
+        q = section.open_state(60.0)
+        q[W] = aside
+        for x, out in ((low - 0.1, True), (low + 0.1, False), (high - 0.1, False), (high + 0.1, True)):
+            for i in (0, 1):
+                moved = q.copy()
+                moved[2 * i] = x
+                assert section.escaped(moved) == WIRES[i : i + out]
+
+
 def test_a_state_is_what_its_poses_say(clamp):
     section, q = Section(clamp, Cas()), np.zeros(SIZE)
     q[[0, 1, 2, 3, D, S]] = 1.0, 2.0, -3.0, 4.0, 26.0, 0.5
