@@ -38,6 +38,7 @@ def test_the_open_clamp_overlaps_nothing_at_any_tilt():
                 room = min(y - clamp.up_splint.thickness, clamp.down_splint.face_depth - low)
                 middle = 0.5 * np.add(*section.arc_centres(q, wire))
                 assert x in (middle[0], *section.mouth(wire), *section.reach(wire))
+                assert section.mouth(wire)[0] <= x <= section.mouth(wire)[1] or x in section.reach(wire)
                 assert y == middle[1] or room == pytest.approx(section.pairs["P1", wire].cylinder.radius)
 
 

@@ -1,7 +1,11 @@
+import re
+from dataclasses import replace
+from inspect import signature
+
 import numpy as np
 import pytest
 
-from clamp3d import InputError, load_clamp, monte_carlo, sensitivity
+from clamp3d import InputError, load_clamp, monte_carlo, placement, sensitivity
 from clamp3d.baselines import Cas
 from clamp3d.clamp import tolerance as montecarlo
 from clamp3d.clamp.final_state import solve_final_state
@@ -86,15 +90,74 @@ def test_what_does_not_clamp_is_counted_by_reason():
     result = monte_carlo(load_clamp(line="48.5"), n=4)
     assert result.nominal is None
     assert sum(result.reasons().values()) == int(np.isnan(result.distance).sum()) == 4
+    assert result.percentiles((50.0,)) == ()
+    said = (
+        "clamped",
+        "not proven: x",
+        "b, loose",
+        "not proven: x",
+        "clamped, but",
+        "a far too long bolt",
+        "not proven: y",
+    )
+    nan = float("nan")
+    mixed = replace(result, distance=np.array([2.0, nan, nan, nan, 3.0, nan, nan]), status=said)
+    assert mixed.clamped.tolist() == [2.0, 3.0]
+    assert mixed.unproven == 3
+    in_order = {"not proven: x": 2, "a far too long bolt": 1, "b, loose": 1, "not proven: y": 1}
+    assert list(mixed.reasons().items()) == list(in_order.items())
+    assert mixed.percentiles((0.0, 50.0, 90.0)) == pytest.approx((2.0, 2.5, 2.9))
+
+
+def test_each_sample_is_a_clamp_of_its_own(monkeypatch):
+    """Closed, not closed, or none; and where nothing is proven it says so."""
+    monkeypatch.setattr(montecarlo, "CHUNK", 2)
+    clamp, told, kinds = load_clamp(), [], ["clamped", "not clamped", "clamped", "not a clamp", "not a clamp"]
+    settings = {"seed": 2, "tolerance": 2.0, "wire_tolerance_percent": 0.0}
+    result = monte_carlo(clamp, n=5, **settings, progress=lambda *at: told.append(at))
+    assert told == [(0, 5), (2, 5), (4, 5), (5, 5)]
+    assert [status.split(":")[0] for status in result.status] == kinds
+    assert np.isnan(result.distance).tolist() == [kind != "clamped" for kind in kinds]
+    drawn = montecarlo.sample_dimensions(result.spec, 2)
+    assert "line.diameter" not in drawn
+    section, state, status = montecarlo.closed(with_dimensions(clamp, drawn))
+    assert (result.distance[2], result.status[2]) == (section.splint_distance(state.q), status.text)
+
+    def refused(asked, closed=montecarlo.closed):
+        if asked is not clamp:
+            raise SolverError("off by 1.5 mm")
+        return closed(asked)
+
+    monkeypatch.setattr(montecarlo, "closed", refused)
+    assert monte_carlo(clamp, n=1, tolerance=0.0).status == ("not proven: off by ... mm",)
+
+
+@pytest.mark.parametrize(
+    ("command", "function", "names"),
+    [
+        ("tolerance", monte_carlo, ("n", "seed", "wire_tolerance_percent", "distribution", "processes")),
+        ("sweep", placement, ("wire", "seat_tolerance")),
+    ],
+)
+def test_a_command_says_the_defaults_of_its_function(command, function, names, main):
+    said = " ".join(main(command, "--help")[1].split())
+    for name in names:
+        option = re.search(rf"--{name.replace('_', '-')} [^[]*(?:\[[^]d]*\][^[]*)?\[default: ([^];]*)", said)
+        assert option[1] == str(signature(function).parameters[name].default), name
+    assert [signature(placement).parameters[name].default for name in ("columns", "yaw", "pitch")] == [40, 0.1, 0.05]
 
 
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
         ({"n": 0}, "n must"),
+        ({"processes": 0}, "processes must"),
+        ({"tolerance": -1e-9}, "tolerance must be >= 0"),
+        ({"tolerance": 1e5}, "tolerance must be >= 0 and < 100000 mm"),
+        ({"wire_tolerance_percent": 50.001}, "wire tolerance must be from 0 to 50 %"),
+        ({"wire_tolerance_percent": -1.0}, "wire tolerance must be from 0"),
         ({"seed": -1}, "seed"),
         ({"tolerance": float("nan")}, "tolerance"),
-        ({"wire_tolerance_percent": 80.0}, "wire tolerance"),
         ({"distribution": "cauchy"}, "one of uniform, normal, got 'cauchy'"),
     ],
 )
