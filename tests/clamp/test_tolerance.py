@@ -163,7 +163,7 @@ def test_a_command_says_the_defaults_of_its_function(command, function, names, m
 )
 def test_bad_settings(settings, match):
     with pytest.raises(InputError, match=match):
-        monte_carlo(load_clamp(), **settings)
+        monte_carlo(load_clamp(), **{"n": 1} | settings)
 
 
 def test_an_address_without_a_scheduler_is_one_line(main):
