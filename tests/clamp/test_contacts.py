@@ -100,6 +100,25 @@ def test_the_bolt_stops_wires_and_is_named():
     assert {(f.a, f.b) for f in assembly.forces if f.force > 0.1} >= {("P4", "P6"), ("P4", "P7")}
 
 
+def test_the_overlap_that_a_status_tells_of_is_one_finding_and_every_other_one_more(run):
+    deep = {("P1", "P3"): -0.5, ("P4", "P6"): -1.2, ("P4", "P7"): -1e-7}
+
+    def changed(c):
+        gap = deep.get((c.a, c.b))
+        return c if gap is None else replace(c, distance=replace(c.distance, lower=gap, upper=gap))
+
+    status = replace(run.closing_status, clamped=False, text="not clamped: P4 overlaps P6 by 1.2 mm")
+    made = replace(run, contacts=tuple(map(changed, run.contacts)), closing_status=status)
+    errors = [(f.text, f.a, f.b) for f in made.findings if f.severity == "error"]
+    assert errors == [(status.text, "P4", "P6"), ("P1 overlaps P3 by 0.5 mm", "P1", "P3")]
+    clamped = replace(made, closing_status=run.closing_status)
+    assert [f.text for f in clamped.findings[:3]] == [
+        "P1 overlaps P3 by 0.5 mm", "P4 overlaps P6 by 1.2 mm", str(run.matrix_differences[0])
+    ]  # fmt: skip
+    assert run.passed
+    assert not clamped.passed
+
+
 def test_plain_data_and_frame(run):
     pandas = pytest.importorskip("pandas")
     data = json.loads(json.dumps(run.to_dict(), allow_nan=False))
@@ -107,6 +126,15 @@ def test_plain_data_and_frame(run):
     assert {"status", "distance_mm", "parts", "contacts", "seats", "events", "residuals", "work"} <= set(data)
     assert data["parts"]["P2"]["T_world"][0][3] == pytest.approx(run.poses["P2"].x)
     assert data["tilt_deg"] == data["path"][-1]["parts"]["P2"]["angle_deg"] == pytest.approx(12.0, abs=0.01)
+    down = run.poses["P2"]
+    section = {"x": down.x, "y": down.y, "angle_deg": math.degrees(down.angle)}
+    assert data["parts"]["P2"]["section"] == data["path"][-1]["parts"]["P2"] == section
+    assert data["residuals"] == {"largest_violated_gap_mm": run.violation, "optimality_mm": run.optimality}
+    assert [event["travel_mm"] for event in data["events"]] == [event.travel for event in run.events]
+    assert [seat["gap_mm"] for seat in data["seats"]] == [seat.gap for seat in run.seats]
+    assert [contact["point"] for contact in data["contacts"]] == [c.point.tolist() for c in run.contacts]
+    assert (data["start"]["closing_mm"], data["start"]["tilt_deg"]) == (run.start.closing, 0.0)
+    assert (data["other_ends"], data["with_play_mm"]) == (None, None)
     up, line, jumper = (run.path[4].poses[name] for name in ("P1", "P6", "P7"))
     start = [pytest.approx((wire.x - up.x, wire.y - up.y)) for wire in (line, jumper)]
     assert [data["start"]["line"], data["start"]["jumper"]] == start

@@ -56,7 +56,10 @@ def test_a_run_tells_the_others_when_asked(run):
     for e in run.others:
         assert str(e) in [finding.text for finding in run.findings if finding.severity == "note"]
         assert e.is_equilibrium == ("slips" not in e.detail)
-    assert len(run.to_dict()["other_ends"]) == len(run.others)
+    data, keys = run.to_dict(), ("distance_mm", "closing_mm", "tilt_deg", "rests")
+    ends = [(e.distance, e.closing, math.degrees(e.tilt), e.is_equilibrium) for e in run.others]
+    assert [tuple(end[key] for key in keys) for end in data["other_ends"]] == ends
+    assert data["with_play_mm"] == {", ".join(p.joints): p.distance for p in run.with_play}
 
 
 def test_command_line_tells_them_unless_told_not_to(main):

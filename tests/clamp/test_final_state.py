@@ -91,6 +91,23 @@ def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_
     assert min(gaps) == pytest.approx(0.0, abs=1e-9)  # the saddle is drawn up to its chords
 
 
+def test_an_assembly_by_tried_positions_is_the_exact_one_within_its_resolution(run):
+    told, thin = [], {"line": "LJ-16", "jumper": "LJ-16"}
+    found = assemble(solver="stepped", moves=(0.29, TILT_STEP), progress=lambda *at: told.append(at))
+    fine = assemble(solver="bisection", moves=(0.29, TILT_STEP), **thin)
+    assert 0.0 <= fine.closing - assemble(**thin).closing <= 1e-3
+    assert 0.0 < found.closing - run.closing <= 0.29
+    assert run.turns - found.turns == pytest.approx((found.closing - run.closing) / 2.5)
+    assert (found.resolution, fine.resolution, run.resolution) == (0.29, 0.01, 1e-6)
+    assert (found.start, found.status) == (run.start, run.status)
+    assert [found.violation, found.optimality, found.others, found.with_play, *found.forces] == [None] * 4
+    assert found.work.contact_queries > found.work.motion_steps > told[-1][0] > run.work.motion_steps == 0
+    assert [(e.step, e.a, e.b) for e in found.events] == [(e.step, e.a, e.b) for e in run.events]
+    assert [e.travel for e in found.events[2:]] == pytest.approx([found.start.closing - found.closing] * 5)
+    assert [(d.a, d.b) for d in found.matrix_differences] == [(d.a, d.b) for d in run.matrix_differences]
+    assert {f.severity for f in fine.findings if "declared 3" in f.text} == {"warning"}
+
+
 def test_moves_that_would_never_end_are_refused(clamp):
     section = Section(clamp, Cas())
     limits = {"step": section.open_distance() / 1e5, "tilt_step": clamp.tilt_stop / 1e5}
