@@ -49,7 +49,7 @@ def test_torque_equation_with_other_dimensions():
 
 
 def test_loads_and_slip_by_hand(run):
-    tight = tighten(run, 80.0, friction=(0.10, 0.20), groove_friction=(0.15, 0.30))
+    tight = tighten(run, 80.0, friction=(0.20, 0.10, 0.14), groove_friction=(0.30, 0.15, 0.20))
     low, high = 80e3 / 5.131640, 80e3 / 2.765820
     loads = {(load.force.a, load.force.b): load for load in tight.contacts}
     for wire, share in (("P6", 0.541), ("P7", 0.462)):
@@ -60,6 +60,14 @@ def test_loads_and_slip_by_hand(run):
         pull = tight.slip[wire]  # both grooves rub
         assert (pull.low, pull.high) == pytest.approx((0.15 * 2 * newton.low, 0.30 * 2 * newton.high))
     assert loads["P2", "P3"].line_load is None
+    assert tight.preload == pytest.approx((low, high))
+    assert len(tight.contacts) == len(loads) == 5  # not what is held on the bolt's axis without a contact
+    data, line = tight.to_dict(), tight.contacts[0]
+    assert data["preloads"] == [{"friction": mu, "preload_n": newton} for mu, newton in tight.preloads]
+    assert data["slip_n"] == {wire: list(pull) for wire, pull in tight.slip.items()}
+    held = {"a": "P1", "b": "P6", "feature": "arc", "force_n": list(line.newton)}
+    assert data["contacts"][0] == held | {"line_load_n_per_mm": list(line.line_load)}
+    assert "line_load_n_per_mm" not in data["contacts"][-1]
 
 
 def test_line_load_takes_each_splints_own_length(run):
@@ -71,7 +79,7 @@ def test_line_load_takes_each_splints_own_length(run):
 def test_limits_are_reached_at_their_torque(run):
     limits = Limits(bolt_force=50e3, line_load=200.0, wire_pull=2000.0)
     limited = replace(run, clamp=replace(REFERENCE, limits=limits))
-    reached = {item.limit: item.torque for item in tighten(limited, 80.0).limits}
+    reached = {item.limit: item.torque for item in tighten(limited, 80.0, groove_friction=(0.1, 0.15, 0.2)).limits}
     assert len(reached) == 1 + 4 + 2
     assert reached["bolt force 50000 N"].low == pytest.approx(50 * 2.765820)
     assert reached["bolt force 50000 N"].high == pytest.approx(50 * 5.131640)
@@ -101,17 +109,26 @@ def test_limits_come_from_the_file(tmp_path):
         (math.nan, (0.1,), "torque must be a finite number, got nan"),
         (80.0, (0.0,), "friction must be > 0 and at most 1, got 0$"),
         (80.0, (), "friction must be > 0 and at most 1, got nothing"),
+        (80.0, (0.5, 1.001), "friction must be > 0 and at most 1, got 0.5, 1.001"),
+        (1.001e6, (1.0,), "torque must be > 0 and at most 1e6 Nm, got 1.001e[+]06"),
     ],
 )
 def test_bad_values(run, torque, friction, message):
     with pytest.raises(InputError, match=message):
         tighten(run, torque, friction=friction)
+    for unfit in ({"forces": ()}, {"closing_status": replace(run.closing_status, clamped=False)}):
+        with pytest.raises(InputError, match="torque: needs a clamp that the exact solver has closed, got 'clamped'"):
+            tighten(replace(run, **unfit), 80.0)
+    assert tighten(run, 1e6, friction=(1.0,)).preload.low == pytest.approx(1e9 / 24.058198)  # 0.4 + 10.658198 + 13
 
 
 def test_every_coefficient_names_its_source(run):
     sources = {c.name: c.source for c in tighten(run, 80.0).coefficients}
     assert "VDI 2230" in sources["torque terms"]
     assert sources["friction of wire and groove"].startswith("chosen")
+    usual = {c.name: c.value for c in tighten(run, 80.0).coefficients}
+    assert (usual["pitch diameter"], usual["bearing diameter"]) == ("18.376 mm", "26 mm")
+    assert sources["friction of thread and nut face"].startswith("chosen")
     values = {c.name: c.value for c in tighten(run, 80.0, friction=(0.15,), groove_friction=(0.3,)).coefficients}
     assert values["friction of thread and nut face"] == "0.15"
     assert values["friction of wire and groove"] == "0.3"
