@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clamp3d.clamp.contact import Poses, measure_contacts
-from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Event, Waypoint
@@ -168,9 +168,14 @@ def _close_splints(step: str, closing: Closing, log: Log) -> None:
     for pair, q in closing.by_hand:
         if not any(np.any(log.aside.get(name, 0.0)) for name in pair):
             poses = section.poses(q, saddle_d=d)
-            log.reach(step, f"down splint touches {pair[1]}", poses)
+            log.reach(step, _meeting(pair), poses)
             log.touch(step, [pair], section.poses(q), d - float(q[D]))
     log.reach(step, "splints closed", section.poses(closing.held, saddle_d=d))
+
+
+def _meeting(pair: Pair) -> str:
+    a, b = pair if pair[0] == "P2" or "P2" not in pair else pair[::-1]
+    return f"{TITLES[a]} touches {b}"
 
 
 def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
@@ -185,7 +190,7 @@ def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
         log.reach(step.name, "saddle meets the down splint", section.poses(seated))
     for pair, q in met:
         if "P2" in step.parts:
-            log.reach(step.name, f"down splint touches {pair[1]}", section.poses(q))
+            log.reach(step.name, _meeting(pair), section.poses(q))
         log.touch(step.name, [pair], section.poses(q), d - float(q[D]))
     end, travel = section.poses(closing.end), d - float(closing.end[D])
     log.reach(step.name, "nut tightened", end)

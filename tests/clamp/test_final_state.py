@@ -92,10 +92,13 @@ def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_
 
 
 def test_an_assembly_by_tried_positions_is_the_exact_one_within_its_resolution(run):
-    told, thin = [], {"line": "LJ-16", "jumper": "LJ-16"}
-    found = assemble(solver="stepped", moves=(0.29, TILT_STEP), progress=lambda *at: told.append(at))
+    told, seen, thin = [], [], {"line": "LJ-16", "jumper": "LJ-16"}
+    settings = {"progress": lambda *at: told.append(at), "on_waypoint": seen.append}
+    found = assemble(solver="stepped", moves=(0.29, TILT_STEP), **settings)
     fine = assemble(solver="bisection", moves=(0.29, TILT_STEP), **thin)
-    assert 0.0 <= fine.closing - assemble(**thin).closing <= 1e-3
+    exact = assemble(**thin)
+    assert 0.0 <= fine.closing - exact.closing <= 1e-3
+    assert "down splint touches P1" in [waypoint.label for waypoint in exact.path]  # their faces
     assert 0.0 < found.closing - run.closing <= 0.29
     assert run.turns - found.turns == pytest.approx((found.closing - run.closing) / 2.5)
     assert (found.resolution, fine.resolution, run.resolution) == (0.29, 0.01, 1e-6)
@@ -106,6 +109,7 @@ def test_an_assembly_by_tried_positions_is_the_exact_one_within_its_resolution(r
     assert [e.travel for e in found.events[2:]] == pytest.approx([found.start.closing - found.closing] * 5)
     assert [(d.a, d.b) for d in found.matrix_differences] == [(d.a, d.b) for d in run.matrix_differences]
     assert {f.severity for f in fine.findings if "declared 3" in f.text} == {"warning"}
+    assert seen == list(found.path)
 
 
 def test_moves_that_would_never_end_are_refused(clamp):

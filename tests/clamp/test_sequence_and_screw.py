@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clamp3d import InputError, assemble
+from clamp3d import InputError, assemble, load_clamp
 from clamp3d.baselines import Cas
 from clamp3d.clamp.contact import measure_contacts
+from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.clamp.states import state
 
@@ -64,6 +65,29 @@ def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say(run):
         assert state(run, name) is run.path[k]
     with pytest.raises(InputError, match=r"available: open, P1\|P2P3P4P5 \(or 1\), .*, P5\|P3P4 \(or 4\), final"):
         state(run, "5")
+
+
+@pytest.mark.parametrize("sequence", [None, "P1|P2P3P4P5 -> P7 -> P5|P2P3P4"])
+def test_what_meets_while_the_nut_takes_up_play_is_told_with_its_way(sequence):
+    run = assemble(replace(load_clamp(), joints=Joints(hole=True)), sequence=sequence)
+    labels = [w.label for w in run.path]
+    by_hand, meets, apart = labels[labels.index("down splint touches P6") :], "saddle meets the down splint", {}
+    both = ["down splint touches P6", "down splint touches P7", "down splint touches P6"]
+    if sequence is None:
+        assert by_hand == [*both, "splints closed", meets, "nut tightened"]
+        closed, met = run.path[-3].poses, run.path[-2].poses
+        assert closed["P3"].y - closed["P1"].y == pytest.approx(run.start.closing - 1.23)  # left where it was
+        assert met["P3"].y - met["P2"].y == pytest.approx(-1.23)  # and drawn up to the round back
+    else:
+        assert by_hand == [*both, "down splint touches P7", "up splint touches P4", "nut tightened"]
+    for e in run.events:
+        apart.setdefault((e.a, e.b), []).append(e.travel)
+    tight = pytest.approx(run.start.closing - run.closing)
+    assert [apart[pair][-1] for pair in (("P1", "P5"), ("P3", "P4"))] == [tight, tight]
+    assert apart["P1", "P4"] == [pytest.approx(apart["P1", "P5"][0], abs=1e-3)]
+    assert len(apart["P2", "P6"]) == len(apart["P2", "P7"]) == 2
+    held = apart["P1", "P5"][0] if sequence else run.start.closing - (met["P2"].y - met["P1"].y)
+    assert apart["P2", "P3"] == [pytest.approx(held)]
 
 
 def test_only_the_papers_own_steps_are_as_published():
