@@ -15,7 +15,7 @@ from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.placement import CaptureMap, Outcome, close_from, close_on
 from clamp3d.clamp.section import WIRES, Section
-from clamp3d.errors import NotClampedError
+from clamp3d.errors import NotClampedError, SolverError
 from clamp3d.kernel import rotation
 from clamp3d.output.placement_report import capture_figure
 from tests.clamp.orders import manifold
@@ -146,9 +146,27 @@ def test_random_starts_end_as_with_springs():
     np.testing.assert_array_equal(outcome == Outcome.SEATED, seated)
 
 
+def test_what_a_closing_ends_in(monkeypatch):
+    section, thick = Section(load_clamp(), Cas()), Section(load_clamp(line=48, jumper=47.8), Cas())
+    assert close_from(thick, open_start(thick)) == Outcome.ON_A_LIP
+    for overlap, outcome in ((8e-7, Outcome.SEATED), (1.2e-6, Outcome.NO_ROOM)):
+        start = open_start(section)
+        start[1] -= overlap
+        assert close_from(section, start) == outcome
+
+    def unproven(*_):
+        raise SolverError
+
+    monkeypatch.setattr("clamp3d.clamp.placement.solve_final_state", unproven)
+    assert close_from(section, open_start(section)) == Outcome.NOT_PROVEN
+
+
 @pytest.fixture(scope="module")
 def placed():
-    return placement(wire="P7", columns=8)
+    told = []
+    found = placement(wire="P7", columns=8, progress=lambda *at: told.append(at))
+    assert told == [(k, 16) for k in range(16)]
+    return found
 
 
 def test_the_map_is_of_closings_from_its_places(placed):
@@ -223,6 +241,8 @@ def test_limits_are_where_it_no_longer_closes(run):
         ({"wire": "P1"}, "wire must be one of P6, P7, got 'P1'"),
         ({"seat_tolerance": -1.0}, "seat tolerance must be a finite length > 0 mm"),
         ({"columns": 3}, "columns must be a whole number from 4 to 1000, got 3"),
+        ({"yaw": 0.0}, "yaw must be > 0 and < 90 deg, got 0 deg"),
+        ({"pitch": math.pi / 2}, "pitch must be > 0 and < 90 deg, got 90 deg"),
     ],
 )
 def test_bad_input(settings, message):

@@ -107,7 +107,7 @@ def test_limits_come_from_the_file(tmp_path):
     [
         (0.0, (0.1,), "torque must be > 0 and at most 1e6 Nm, got 0"),
         (math.nan, (0.1,), "torque must be a finite number, got nan"),
-        (80.0, (0.0,), "friction must be > 0 and at most 1, got 0$"),
+        (80.0, (0.1, 0.0), "friction must be > 0 and at most 1, got 0, 0.1$"),
         (80.0, (), "friction must be > 0 and at most 1, got nothing"),
         (80.0, (0.5, 1.001), "friction must be > 0 and at most 1, got 0.5, 1.001"),
         (1.001e6, (1.0,), "torque must be > 0 and at most 1e6 Nm, got 1.001e[+]06"),
