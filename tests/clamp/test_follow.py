@@ -12,8 +12,9 @@ from clamp3d.baselines import Cas
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.play import Log
 from clamp3d.clamp.section import Section
-from clamp3d.clamp.ways import Insertion
+from clamp3d.clamp.ways import Insertion, out
 from clamp3d.errors import SequenceError
 from clamp3d.kernel import translation
 from clamp3d.output.report import make_report
@@ -70,9 +71,27 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
         if {a, b} != {"P3", "P4"}:
             (low, high), (other_low, other_high) = (parts(run.clamp)[n].bounds_at(first[n].T()) for n in (a, b))
             assert max((low - other_high).max(), (other_low - high).max()) >= 10.0 - 1e-9, (a, b)
+    ways = dict.fromkeys((step.step for step in run.path), 0.0)
+    for before, after in itertools.pairwise(run.path):
+        if after.label.startswith("P") or after.label == "nut on the bolt's end":
+            name, origin = (after.label[:2], after.label.split(", ")[1]) if "," in after.label else ("P5", "from above")
+            by = (after.T_world(name) - before.T_world(name))[:3, 3]
+            assert by == pytest.approx(-np.linalg.norm(by) * out(origin), abs=1e-9)
+            ways[after.step] += np.linalg.norm(by)
+    arrived = [(e.travel, ways[e.step]) for e in run.events if ways[e.step]]
+    assert [travel for travel, _ in arrived] == pytest.approx([way for _, way in arrived])
     (ends,) = [w.poses for w in run.path if w.label == "nut on the bolt's end"]
     assert ends["P5"].y + run.clamp.nut.height == pytest.approx(ends["P4"].y, abs=1e-9)
     assert len({w.step for w in run.path}) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
+
+
+def test_what_waits_is_shifted_in_the_world_and_in_plain_data(run):
+    log = Log(Section(run.clamp, Cas()), None, aside={"P7": np.array([1.0, 2.0, 3.0])})
+    log.reach("P7", "waits", run.poses)
+    [waits] = log.path
+    assert (waits.T_world("P7") - run.T_world("P7"))[:3, 3].tolist() == pytest.approx([1.0, 2.0, 3.0])
+    written = waits.to_dict()["parts"]
+    assert (written["P7"]["along"], written["P6"]) == (2.0, run.path[-1].to_dict()["parts"]["P6"])
 
 
 def test_the_papers_own_motions_overlap_nowhere(run):
