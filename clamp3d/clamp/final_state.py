@@ -90,7 +90,7 @@ class FinalState:
     @property
     def residual(self) -> float:
         """Largest residual of the optimality conditions, mm; infinite if it is not a number."""
-        return float(np.nan_to_num(max(self.violation, self.optimality), nan=np.inf))
+        return float(np.nan_to_num(np.maximum(self.violation, self.optimality), nan=np.inf))
 
     @property
     def is_proven(self) -> bool:
@@ -201,8 +201,8 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
         held=q if section.free == HELD else held,  # nothing moves while the nut turns
         gaps=gaps,
         multipliers=multipliers,
-        violation=max(0.0, -float(gaps.value.min())),
-        optimality=max(step, residual, complementarity),
+        violation=float(np.maximum(0.0, -gaps.value.min())),
+        optimality=float(np.max([step, residual, complementarity])),
         loose=loose,
         curvature=_least_curvature(section, q, gaps, multipliers),
     )

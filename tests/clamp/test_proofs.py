@@ -4,6 +4,7 @@ import itertools
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from clamp3d import assemble, load_clamp
@@ -40,6 +41,15 @@ def test_a_state_that_is_off_is_not_proven(wire, shift, monkeypatch):
     monkeypatch.setattr(final_state, "_polish", off)
     with pytest.raises(SolverError, match="final state not proven"):
         solve_final_state(section)
+
+
+def test_proven_is_what_meets_every_limit(section):
+    state = solve_final_state(section)
+    for name, good, bad in (("violation", 9e-10, 1.1e-9), ("optimality", 9e-10, 1.1e-9), ("curvature", -9e-7, -1.1e-6)):
+        assert replace(state, **{name: good}).is_proven
+        assert not replace(state, **{name: bad}).is_proven
+    for name in ("violation", "optimality"):
+        assert not replace(state, **{name: np.nan}).is_proven
 
 
 def test_a_state_with_play_that_is_not_proven_is_said_to_be_so_beside_the_others(monkeypatch):
