@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
 from clamp3d.clamp import final_state
 from clamp3d.clamp.equilibria import same
-from clamp3d.clamp.final_state import solve_final_state
+from clamp3d.clamp.final_state import open_up, solve_final_state
 from clamp3d.clamp.play import meetings
 from clamp3d.clamp.result import Waypoint
-from clamp3d.clamp.section import D, Section
+from clamp3d.clamp.section import D, S, Section, U
 from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SolverError
 from clamp3d.kernel import SectionPose
@@ -50,6 +51,38 @@ def test_proven_is_what_meets_every_limit(section):
         assert not replace(state, **{name: bad}).is_proven
     for name in ("violation", "optimality"):
         assert not replace(state, **{name: np.nan}).is_proven
+
+
+def test_curvature_is_that_of_the_distance_on_motions_that_keep_contacts_closed(section):
+    """Second differences: each motion is brought back onto the contacts by Newton's method."""
+    state, moving, h = solve_final_state(section), list(section.free), 0.02
+    rows = np.flatnonzero(state.multipliers)
+    motions = null_space(state.gaps.gradient[rows][:, moving])
+    assert motions.shape[1] == 2
+
+    def distance(motion):
+        q = state.q.copy()
+        q[moving] += motion
+        for _ in range(8):
+            gaps = section.gaps(q)
+            q[moving] -= np.linalg.pinv(gaps.gradient[rows][:, moving]) @ gaps.value[rows]
+        return q[D]
+
+    turns = [h * motions @ (np.cos(t), np.sin(t)) for t in np.linspace(0.0, np.pi, 60)]
+    least = min(distance(turn) + distance(-turn) - 2.0 * state.q[D] for turn in turns) / h**2
+    assert state.curvature == pytest.approx(least, rel=2e-3)
+
+
+@pytest.mark.parametrize("moved", [{D: -0.3}, {U: -0.2}, {1: -0.2}, {S: 0.4, 3: 0.3}])
+def test_an_overlapping_state_is_opened_until_it_is_free_and_hardly_further(section, moved):
+    q = solve_final_state(section).q
+    for k, by in moved.items():
+        q[k] += by
+    opened = open_up(section, q, 0.01)
+    assert section.gaps(q).value.min() < -0.1
+    assert section.gaps(opened).value.min() >= -1e-9
+    assert np.abs(opened - q).max() < 0.8
+    assert open_up(section, q, 1e-6) is None or D not in moved
 
 
 def test_a_state_with_play_that_is_not_proven_is_said_to_be_so_beside_the_others(monkeypatch):
