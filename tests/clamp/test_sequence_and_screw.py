@@ -69,25 +69,27 @@ def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say(run):
 
 @pytest.mark.parametrize("sequence", [None, "P1|P2P3P4P5 -> P7 -> P5|P2P3P4"])
 def test_what_meets_while_the_nut_takes_up_play_is_told_with_its_way(sequence):
-    run = assemble(replace(load_clamp(), joints=Joints(hole=True)), sequence=sequence)
-    labels = [w.label for w in run.path]
-    by_hand, meets, apart = labels[labels.index("down splint touches P6") :], "saddle meets the down splint", {}
-    both = ["down splint touches P6", "down splint touches P7", "down splint touches P6"]
+    run, met = assemble(replace(load_clamp(), joints=Joints(hole=True)), sequence=sequence), {}
+    labels, paths = [w.label for w in run.path], {w.label: w.poses for w in run.path}
+    expected = [f"down splint touches P{k}" for k in (6, 7, 6)]
+    all_the_way = run.start.closing - run.closing
     if sequence is None:
-        assert by_hand == [*both, "splints closed", meets, "nut tightened"]
-        closed, met = run.path[-3].poses, run.path[-2].poses
-        assert closed["P3"].y - closed["P1"].y == pytest.approx(run.start.closing - 1.23)  # left where it was
-        assert met["P3"].y - met["P2"].y == pytest.approx(-1.23)  # and drawn up to the round back
+        expected += ["splints closed", "saddle meets the down splint", "nut tightened"]
+        before, held = paths["splints closed"], paths["saddle meets the down splint"]
+        assert before["P3"].y - before["P1"].y == pytest.approx(run.start.closing - 1.23)  # left where it was
+        assert held["P3"].y - held["P2"].y == pytest.approx(-1.23)  # and drawn up to the round back
+        drawn = run.start.closing - (held["P2"].y - held["P1"].y)
     else:
-        assert by_hand == [*both, "down splint touches P7", "up splint touches P4", "nut tightened"]
+        expected += ["down splint touches P7", "up splint touches P4", "nut tightened"]
+        drawn = all_the_way
+    assert labels[-6:] == expected
     for e in run.events:
-        apart.setdefault((e.a, e.b), []).append(e.travel)
-    tight = pytest.approx(run.start.closing - run.closing)
-    assert [apart[pair][-1] for pair in (("P1", "P5"), ("P3", "P4"))] == [tight, tight]
-    assert apart["P1", "P4"] == [pytest.approx(apart["P1", "P5"][0], abs=1e-3)]
-    assert len(apart["P2", "P6"]) == len(apart["P2", "P7"]) == 2
-    held = apart["P1", "P5"][0] if sequence else run.start.closing - (met["P2"].y - met["P1"].y)
-    assert apart["P2", "P3"] == [pytest.approx(held)]
+        met.setdefault(e.a + e.b, []).append(e.travel)
+    assert (met["P1P5"], met["P3P4"], met["P2P3"]) == tuple(
+        [pytest.approx(way)] for way in (all_the_way,) * 2 + (drawn,)
+    )
+    assert met["P1P4"] == [pytest.approx(all_the_way, abs=1e-3)]
+    assert len(met["P2P6"]) == len(met["P2P7"]) == 2
 
 
 def test_only_the_papers_own_steps_are_as_published():
