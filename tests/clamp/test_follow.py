@@ -113,6 +113,9 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     assert left == sorted(left)
     assert (first.a, first.b) == pair
     assert f"t = {first.travel / first.way:.4f}" in str(refused.value)
+    written = first.to_dict()
+    assert (written["travel_mm"], written["way_mm"]) == (first.travel, first.way)
+    assert written["t"] == pytest.approx(first.travel / first.way)
     assert "X {:z.3f}, Y {:z.3f}, Z {:z.3f}".format(*first.point) in str(refused.value)
     assert travel is None or first.travel == pytest.approx(travel, abs=1e-3)
     scene = refused.value.scene  # for the viewer: the parts that are there, on the same way
@@ -136,6 +139,9 @@ def test_a_splint_that_rests_on_the_line_beside_the_middle_of_its_groove_comes_f
     assert origin == "from above"  # until its underside is over the line, and 20 mm more
     top = section.clamp.line.radius - place["P1"][2, 3]
     assert length == pytest.approx(top + section.clamp.up_splint.thickness + 20.0)
+    for into, is_free in ((5e-4, True), (2e-3, False)):  # what touches slides, what overlaps is blocked
+        sunk = place | {"P1": translation(0.0, 0.0, -into) @ place["P1"]}
+        assert bool(Insertion(section.clamp, [("P1", "P6")], sunk).way_out()) == is_free
 
 
 def test_a_report_of_any_sequence_counts_the_nuts_turns_from_the_open_clamp():
