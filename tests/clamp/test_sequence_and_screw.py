@@ -90,6 +90,8 @@ def test_what_meets_while_the_nut_takes_up_play_is_told_with_its_way(sequence):
     )
     assert met["P1P4"] == [pytest.approx(all_the_way, abs=1e-3)]
     assert len(met["P2P6"]) == len(met["P2P7"]) == 2
+    sideways = sum(f.force * f.direction[0] * ((f.b == "P2") - (f.a == "P2")) for f in run.forces)
+    assert sideways == pytest.approx(0.0, abs=1e-9)
 
 
 def test_only_the_papers_own_steps_are_as_published():
