@@ -1,13 +1,14 @@
 """Dimensions made in Python: wrong values are the same one-line errors as from a file."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from clamp3d import InputError, load_clamp
-from clamp3d.clamp.dimensions import Wire
+from clamp3d.clamp.dimensions import SMALLEST, Joints, Wire
 from tests.clamp.random_clamps import changed, whole_clamp
 
 
@@ -19,6 +20,14 @@ def test_wrong_values_in_python_are_one_line_too():
     wide = r"^Clamp: line: the diameter must be less than twice up_splint\.width = 137 mm, got 300; are both in mm\?$"
     with pytest.raises(InputError, match=wide):
         replace(load_clamp(), line=Wire(diameter=300.0))
+
+
+def complaint(clamp, path, value):
+    try:
+        changed(clamp, {path: value})
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def _half_mouth(radius, into):
@@ -67,20 +76,42 @@ def test_each_rule_holds_up_to_its_limit_and_no_further(path, limit, side, messa
     """Which follows from where the bodies meet; ``side``: whether the value must be above the limit or below."""
     clamp = load_clamp(line=30.0, jumper=30.0)
 
-    def complaint(value):
-        try:
-            changed(clamp, {path: value})
-        except InputError as error:
-            return str(error)
-        return ""
-
-    wrong = complaint(limit * (1.0 - 1e-6 * side))
+    wrong = complaint(clamp, path, limit * (1.0 - 1e-6 * side))
     assert message in wrong
-    assert message not in complaint(limit * (1.0 + 1e-6 * side))
+    assert message not in complaint(clamp, path, limit * (1.0 + 1e-6 * side))
+    if limit == round(limit, 2):  # it is itself too much
+        assert message in complaint(clamp, path, limit)
     if "centre_depth" not in path and path != "down_splint.width":  # whose messages have other numbers
         assert f"{limit:.4g}"[:5] in wrong
     if "underside" in message and "centre_depth" in path:
         assert wrong.endswith(f"{_FLAT:.4g} mm, got {_FLAT:.4g}")
+
+
+@pytest.mark.parametrize(
+    ("path", "low", "high"),
+    [
+        ("limits.bolt_force", 0.0, 1e9),
+        ("down_splint.back_half_angle_deg", 0.0, 90.0),
+        ("down_splint.max_tilt_deg", 0.0, 45.0),
+        ("bolt.pitch", SMALLEST * (1.0 - 1e-9), 1e5),
+        ("down_splint.line_groove.centre_depth", -1e5, 1e5),
+    ],
+)
+def test_each_value_has_a_range(path, low, high):
+    wrong = rf"{path.rpartition('.')[2]}: must be (at least|greater than|less than)"
+    for value in (low, high):
+        assert re.search(wrong, complaint(load_clamp(), path, value))
+    for value in (low + 1e-6, high * (1.0 - 1e-9)):
+        assert not re.search(wrong, complaint(load_clamp(), path, value))
+
+
+def test_what_a_file_leaves_out_and_what_follows_from_other_values():
+    clamp = load_clamp()
+    assert clamp.joints == Joints(hole=False, saddle=False, washer=False)
+    pairs = (("P1", "P6"), ("P6", "P1"), ("P5", "P4"), ("P1", "P2"), ("P7", "P6"))
+    assert [clamp.connection(*pair) for pair in pairs] == [3, 3, 1, 0, 0]
+    lengths = [changed(clamp, {f"{splint}.length": 90.0}).wire_length for splint in ("up_splint", "down_splint")]
+    assert lengths == [270.0, 270.0]
 
 
 def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
@@ -97,6 +128,10 @@ def test_a_groove_deeper_than_half_is_widest_inside_the_splint():
         made(offset - out)
         with pytest.raises(InputError, match=message):
             made(offset + out)
+    shallow = replace(up.line_groove, centre_depth=up.line_groove.radius + 1e-6, offset=40.0)
+    replace(up, line_groove=shallow)
+    with pytest.raises(InputError, match="line_groove: the arc cuts the top face"):
+        replace(up, line_groove=replace(shallow, centre_depth=shallow.radius))
     made(40.0, 60.0 - 23.8012 + 1e-6)
     with pytest.raises(InputError, match="does not reach its face"):
         made(40.0, 60.0 - 23.8012 - 1e-6)

@@ -29,6 +29,7 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ("P4 = { P5 = 1 }", "P4 = { P5 = -1 }", "connections.P4.P5: must be 0, 1, 2 or 3, got -1"),
         ("P4 = 2, P5", "P9 = 2, P5", "connections.P1.P9: must be 'P1', 'P2'"),
         ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
+        ("P4 = { P5 = 1 }", "P4 = { P4 = 1 }", "connections.P4.P4: the matrix is given above its diagonal"),
         ("[nut]", "[nut", "not valid TOML"),
     ],
 )
