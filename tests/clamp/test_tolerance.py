@@ -132,18 +132,13 @@ def test_each_sample_is_a_clamp_of_its_own(monkeypatch):
     assert monte_carlo(clamp, n=1, tolerance=0.0).status == ("not proven: off by ... mm",)
 
 
-@pytest.mark.parametrize(
-    ("command", "function", "names"),
-    [
-        ("tolerance", monte_carlo, ("n", "seed", "wire_tolerance_percent", "distribution", "processes")),
-        ("sweep", placement, ("wire", "seat_tolerance")),
-    ],
-)
-def test_a_command_says_the_defaults_of_its_function(command, function, names, main):
-    said = " ".join(main(command, "--help")[1].split())
-    for name in names:
-        option = re.search(rf"--{name.replace('_', '-')} [^[]*(?:\[[^]d]*\][^[]*)?\[default: ([^];]*)", said)
-        assert option[1] == str(signature(function).parameters[name].default), name
+def test_commands_say_the_defaults_of_their_functions(main):
+    tolerance, sweep = "n seed wire_tolerance_percent distribution processes", "wire seat_tolerance"
+    for command, function, names in (("tolerance", monte_carlo, tolerance), ("sweep", placement, sweep)):
+        said = " ".join(main(command, "--help")[1].split())
+        for name in names.split():
+            option = re.search(rf"--{name.replace('_', '-')} [^[]*(?:\[[^]d]*\][^[]*)?\[default: ([^];]*)", said)
+            assert option[1] == str(signature(function).parameters[name].default), name
     assert [signature(placement).parameters[name].default for name in ("columns", "yaw", "pitch")] == [40, 0.1, 0.05]
 
 
