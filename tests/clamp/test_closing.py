@@ -73,6 +73,7 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
     assert run.closing == pytest.approx(final.q[D] - final.q[U])
     if not joints.saddle:
         assert list(on_saddle) == [EDGES]
+        assert any(abs(state.q[D] - final.q[D]) < 1e-8 for state in equilibria(Section(clamp, Cas())))
         assert {c.relation: c.type for c in run.contacts if (c.a, c.b) == ("P2", "P3")} == {"contact": 2}
         assert final.q[U] > 3.0
 

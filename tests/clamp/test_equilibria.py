@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -11,7 +12,7 @@ from clamp3d.bench.stress.assemblies.clamps import clamp_of
 from clamp3d.bench.stress.assemblies.envelope import Envelope
 from clamp3d.bench.stress.assemblies.family import ASSEMBLIES
 from clamp3d.clamp.equilibria import describe, equilibria
-from clamp3d.clamp.section import Section
+from clamp3d.clamp.section import D, Section
 
 
 def clamp_with(radius, wire, half_angle=math.pi / 3):
@@ -36,6 +37,8 @@ def test_oversize_wires_rest_on_all_lips():
         "jumper on a lip of the up splint and a lip of the down splint"
     )
     assert not section.escaped(states[0].q)
+    free = replace(states[0], multipliers=0.0 * states[0].multipliers, loose=("P7",))
+    assert describe(free, ("P6",)) == "power line slips out of its groove, jumper loose"
 
 
 def test_a_lip_holds_nothing_beside_the_face_that_a_wire_lies_on():
@@ -43,6 +46,7 @@ def test_a_lip_holds_nothing_beside_the_face_that_a_wire_lies_on():
     clamp = ASSEMBLIES["assembly: tilt limit"].cases(50, 0).cases[45].clamp
     envelope, states = Envelope(clamp), equilibria(Section(clamp, Cas()))
     assert len(states) == 2
+    assert states[0].q[D] < states[1].q[D]
     for state in states:
         assert envelope.falls(state.q) <= 1e-8
 
