@@ -34,6 +34,8 @@ of k times its radius it is 2 (1 + k) / (1 + sqrt k)^2 times as far.
 
 _FINER = (1.0, 4.0, 16.0)
 """How much finer meshes are asked for, one after the other, where the one before overlooks some of a spline."""
+_MANY = 20_000
+"""Triangles from which on finer meshes take tens of seconds, and mostly overlook the same."""
 _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
@@ -74,7 +76,8 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
         occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord / finer, False, ANGLE, False)
         meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
         overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
-        if max((off.max(initial=0.0) for off in overlooked), default=0.0) <= chord:
+        worst = max((off.max(initial=0.0) for off in overlooked), default=0.0)
+        if worst <= chord or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
             break
     corners, triples, numbers, errors = [], [], [], []
     count = 0
