@@ -25,6 +25,8 @@ def _distance(clamp, near):
 def test_derivatives_are_the_solvers_differences(line, jumper):
     clamp = load_clamp(line=line, jumper=jumper)
     rows = {row.name: row for row in sensitivity(clamp)}
+    assert 0 < len(rows) < len(DIMENSIONS)
+    assert all(abs(row.derivative) > 1e-8 for row in rows.values())  # what has no influence is not listed
     near = solve_final_state(Section(clamp, Cas()))
     carrying = {f for f, force in zip(near.gaps.feature, near.multipliers, strict=True) if force > 0.0}
     assert any(f.startswith("lip") for f in carrying) == (line is not None)
