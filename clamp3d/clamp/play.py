@@ -174,6 +174,7 @@ def _close_splints(step: str, closing: Closing, log: Log) -> None:
 
 
 def _meeting(pair: Pair) -> str:
+    """The label of a waypoint at which two parts meet, that of the down splint if it is one of them."""
     a, b = pair if pair[0] == "P2" or "P2" not in pair else pair[::-1]
     return f"{TITLES[a]} touches {b}"
 

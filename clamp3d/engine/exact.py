@@ -15,7 +15,8 @@ from clamp3d.engine.overlap import common
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
-from clamp3d.files.pairs import TOLERANCE, CommonPart
+from clamp3d.files.open_cascade import TOLERANCE
+from clamp3d.files.pairs import CommonPart
 from clamp3d.geometry.pose import Array, to_source
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"

@@ -19,7 +19,7 @@ from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
 from clamp3d.engine.model import CAD_CHORDS, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import Clamp3dError, SolverError
-from clamp3d.files.pairs import TOLERANCE
+from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, inverse
 
 ACCURACY = 1e-7

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.open_cascade import explore, occ
+from clamp3d.files.open_cascade import TOLERANCE, explore, occ
 from clamp3d.geometry.mesh import Array
 
 _BEYOND = 0.05
@@ -62,19 +62,19 @@ class Boundary:
     def side(self, point: Array) -> tuple[Side, Foot]:
         """On which side a point (3,) lies, and its foot.
 
-        Lemma: nothing of the surface is between a point and its foot, so where that is in a face its normal tells the
-        side. On edges the classifier does. Near splines that is wrong now and then: what is beyond the foot is on the
-        other side, and if it says the same of both, nobody knows.
+        Lemma: nothing of the surface is between a point and its foot, so where that is in a face the side follows from
+        its normal. On edges the classifier decides. Near splines that is wrong now and then: what is beyond the foot is
+        on the other side, and if both are said to be on one side, the side is unknown.
         """
         foot = self.foot(point)
         if foot.normal is not None:
             return (Side.OUTSIDE if float((point - foot.point) @ foot.normal) >= 0.0 else Side.INSIDE), foot
-        beyond = foot.point + min(1.0, _BEYOND / max(foot.distance, 1e-9)) * (foot.point - point)
+        beyond = foot.point + min(1.0, _BEYOND / max(foot.distance, TOLERANCE)) * (foot.point - point)
         side = Side.OUTSIDE if self._is_outside(point) else Side.INSIDE
         return (Side.UNKNOWN if self._is_outside(beyond) is (side is Side.OUTSIDE) else side), foot
 
     def _is_outside(self, point: Array) -> bool:
-        self._classifier.Perform(occ.gp_Pnt(*point.tolist()), 1e-6)
+        self._classifier.Perform(occ.gp_Pnt(*point.tolist()), TOLERANCE)
         return bool(self._classifier.State() == occ.TopAbs_State.TopAbs_OUT)
 
     @cached_property

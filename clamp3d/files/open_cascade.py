@@ -14,6 +14,9 @@ import numpy as np
 from clamp3d.errors import MissingLibraryError
 from clamp3d.geometry.mesh import Array
 
+TOLERANCE = 1e-6
+"""Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
+
 
 class _OpenCascade:
     """The classes of Open CASCADE as attributes; the first that is asked for loads it."""

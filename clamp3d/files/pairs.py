@@ -11,13 +11,20 @@ import numpy as np
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.boundary import Boundary, Side, vertex
 from clamp3d.files.faces import SPHERE, surfaces
-from clamp3d.files.open_cascade import area_of, bounds_of, explore, from_bytes, moved, occ, parse, volume_of
+from clamp3d.files.open_cascade import (
+    TOLERANCE,
+    area_of,
+    bounds_of,
+    explore,
+    from_bytes,
+    moved,
+    occ,
+    parse,
+    volume_of,
+)
 from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
-
-TOLERANCE = 1e-6
-"""Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
 
 _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
