@@ -29,8 +29,8 @@ PAIRS: tuple[Pair, ...] = tuple(itertools.combinations(PARTS, 2))
 def millimetres(gap: float) -> str:
     """A gap in mm for people: three digits, more where it is smaller than they show, and 0 for rounding.
 
-    >>> millimetres(1.0), millimetres(-2.5e-5), millimetres(3e-15)
-    ('1.000', '-2.5e-05', '0')
+    >>> [millimetres(gap) for gap in (1.0, 0.0012, -9.876e-4, 6e-10, 4e-10)]
+    ['1.000', '0.001', '-0.000988', '6e-10', '0']
     """
     return "0" if abs(gap) < 5e-10 else f"{gap:.3g}" if abs(gap) < 1e-3 else f"{gap:.3f}"
 

@@ -13,6 +13,7 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.parts import parts
 from clamp3d.geometry.meshing import volume_bounds
 from clamp3d.shapes import mesh
+from tests.clamp.random_clamps import changed
 
 CLAMP = load_clamp()
 REFERENCE = parts(CLAMP)
@@ -83,6 +84,10 @@ def test_bad_values_say_what_is_wrong():
     for bad in (0.0, -1.0, math.nan, math.inf, 1e-7):
         with pytest.raises(InputError, match="mesh_error must be a finite length >= 1e-06 mm"):
             mesh(REFERENCE["P5"], bad)
-    short = replace(CLAMP, up_splint=replace(CLAMP.up_splint, length=20.0))
-    with pytest.raises(InputError, match=r"up_splint.hole_diameter must be < the part's length = 20 mm, got 22"):
-        parts(short)
+    for part, hole in (("up_splint", "hole_diameter"), ("down_splint", "slot_length"), ("saddle", "hole_diameter")):
+        size = getattr(getattr(CLAMP, part), hole)
+        parts(changed(CLAMP, {f"{part}.length": size + 1e-6}))
+        with pytest.raises(
+            InputError, match=rf"{part}\.{hole} must be < the part's length = {size:g} mm, got {size:g}"
+        ):
+            parts(changed(CLAMP, {f"{part}.length": size}))
