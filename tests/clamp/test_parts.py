@@ -72,12 +72,27 @@ def test_other_grooves_major_arcs_too_give_closed_meshes(radius, depth, gap, err
     assert low - 1e-7 <= solid.volume <= high + 1e-7
 
 
-def test_a_slot_wider_than_the_round_back_comes_out_of_the_flat_underside():
-    down = replace(CLAMP.down_splint, slot_width=66.0)
-    assert down.slot_bottom == down.underside_depth
-    part = parts(replace(CLAMP, down_splint=down))["P2"]
+FLAT = {
+    "face_depth": 0.5,
+    "back_half_angle_deg": 89.0,
+    **{f"{g}_groove.centre_depth": -23.2 for g in ("line", "jumper")},
+}
+WIDE = {"hole_diameter": 97.9, "width": 98.0, "length": 100.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("P2", {"down_splint.slot_width": 66.0}),  # which comes out of the flat underside beside the round back
+        ("P3", {f"down_splint.{key}": FLAT[key] for key in FLAT} | {f"saddle.{key}": WIDE[key] for key in WIDE}),
+    ],
+)
+def test_wide_holes_have_the_volume_of_their_mesh(name, values):
+    clamp = changed(CLAMP, values | {"down_splint.max_tilt_deg": None})
+    part = parts(clamp)[name]
     low, high = volume_bounds(part, 1e-4)
     assert low < mesh(part, 1e-4).volume < high
+    assert (clamp.down_splint.slot_bottom == clamp.down_splint.underside_depth) == (name == "P2")
 
 
 def test_bad_values_say_what_is_wrong():
