@@ -1,5 +1,6 @@
 """Clamp files: what is right loads, what is wrong gives one line with file, key, value and rule."""
 
+import re
 from importlib import resources
 
 import numpy as np
@@ -31,11 +32,17 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
         ("P4 = { P5 = 1 }", "P4 = { P4 = 1 }", "connections.P4.P4: the matrix is given above its diagonal"),
         ("[nut]", "[nut", "not valid TOML"),
+        ("[nut]", f"x = {'1' * 5000}\n[nut]", "not valid TOML: Exceeds the limit"),
+        ("[nut]", f"x = {'[' * 5000}\n[nut]", "not valid TOML: tables or arrays nested too deeply"),
+        ("[nut]", f"[a{'.a' * 65}]\n[nut]", "not valid TOML: a key of more than 64 dots: a.a"),
+        ("[nut]", f"[a{'.a' * 64}]\n[nut]", "a is not a known key"),
+        ("[nut]", "[parts.nut]", "is a scene, not a clamp"),
+        ("[nut]", "[include]", "is a scene, not a clamp"),
     ],
 )
 def test_bad_files_give_one_clear_line(tmp_path, old, new, message):
     assert old in REFERENCE
-    path = tmp_path / "mine.toml"
+    path = tmp_path / "reference.toml"  # its name alone would be the built-in one's
     path.write_text(REFERENCE.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(InputError) as caught:
         load_clamp(path)
@@ -45,9 +52,18 @@ def test_bad_files_give_one_clear_line(tmp_path, old, new, message):
     assert "\n" not in text
 
 
-@pytest.mark.parametrize("source", ["nothing.toml", "nothing", "."])
-def test_a_file_that_is_not_there(source):
-    with pytest.raises(InputError, match=r"no such file|not a regular file|unknown clamp"):
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("nothing.toml", "nothing.toml: no such file"),
+        ("nothing", "unknown clamp 'nothing'; built in: reference; or give a .toml file"),
+        (".", ".: not a regular file"),
+        ("/proc/self/mem", "/proc/self/mem: cannot be read: Input/output error"),
+        (3, "clamp must be a path, got 3"),
+    ],
+)
+def test_a_file_that_is_not_there(source, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
         load_clamp(source)
 
 
@@ -68,10 +84,12 @@ def test_wires_by_name_and_by_diameter():
         assert load_clamp(line=number).line.radius == 8.0
 
 
-@pytest.mark.parametrize("line", ["0", "-3", "nan", "inf", "1e9", 0, -1.0, np.nan, np.inf, True, [16], "LJ-17", b"16"])
+@pytest.mark.parametrize(
+    "line", ["0", "-3", "nan", "inf", "1e9", 0, -1.0, np.nan, np.inf, True, [16], "LJ-17", b"16", "1" * 300]
+)
 def test_what_is_no_wire_is_named(line):
     with pytest.raises(
-        InputError, match=r"^(line diameter must be > 0 |line must be a conductor's name |unknown conductor ).*$"
+        InputError, match=r"^(line diameter must be > 0 |line must be a conductor's name |unknown conductor ).{,90}$"
     ):
         load_clamp(line=line)
 
@@ -84,7 +102,9 @@ def test_catalogue_is_complete():
 
 def test_a_clamp_is_given_by_name_by_file_or_loaded(tmp_path):
     copy = tmp_path / "copy.toml"
-    copy.write_text(REFERENCE)
+    copy.write_text(REFERENCE, encoding="utf-8-sig")  # with a byte order mark
     found = [assemble(clamp, line="LJ-500", jumper=16) for clamp in ("reference", copy, load_clamp())]
     assert len({(a.status, a.distance) for a in found}) == 1
     assert repr(found[0]) == f"<Assembly reference: clamped, {found[0].distance:.3f} mm>"
+    with pytest.raises(InputError, match=r"^reference: line: the diameter must be less than"):
+        load_clamp(load_clamp(), line=300.0)

@@ -22,7 +22,7 @@ from clamp3d.clamp.states import state
         ("P1|P2P2", "P2 is named twice"),
         ("P1|P2P3P4P5 -> P6 -> P7", "part of sequence step 2 must be one of P1, P2, P3, P4, P5, P7, got 'P6'"),
         ("P1|P2P3P4P5 -> P2 -> P5|P3P4", "must bring every part but P6; missing P7 in"),
-        ("P1|P2P3P4P5 -> P7 -> P2 -> P2", r"step 4, P2: P2 \(down splint\) is closed already"),
+        ("P1|P2P3P4P5 -> P7 -> P2 -> P1|P2", r"step 4, P1\|P2: P2 \(down splint\) is closed already"),
         ("P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4 -> P3", r"step 5, P3: P3 \(saddle washer\) is closed already"),
         ("P1/P2", "must read like"),
         (" -> ".join(["P7"] * 31), "at most 30 steps, got 31"),
@@ -101,6 +101,8 @@ def test_only_the_papers_own_steps_are_as_published():
         "P1|P2P3P4P5 -> P7 -> P5|P2P3P4": "bring bring tighten",
         "P1|P3 -> P2|P4P5 -> P2|P3 -> P7 -> P5|P3P4": "bring bring bring bring tighten",
         "P1|P2P3P4P5 -> P7 -> P5|P1P3P4 -> P5|P3": "bring bring bring bring close tighten",
+        "P2 -> P2 -> P1|P3P4P5 -> P7": "bring close bring bring tighten",
+        "P1|P2P4P5 -> P7 -> P5|P3P4": "bring bring bring close tighten",
     }
     for k, (text, expected) in enumerate(kinds.items()):
         steps = parse_sequence(text)
