@@ -24,7 +24,7 @@ from clamp3d.clamp.states import state
         ("P1|P2P3P4P5 -> P2 -> P5|P3P4", "must bring every part but P6; missing P7 in"),
         ("P1|P2P3P4P5 -> P7 -> P2 -> P1|P2", r"step 4, P1\|P2: P2 \(down splint\) is closed already"),
         ("P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4 -> P3", r"step 5, P3: P3 \(saddle washer\) is closed already"),
-        ("P1/P2", "must read like"),
+        ("P1|", "must read like"),
         (" -> ".join(["P7"] * 31), "at most 30 steps, got 31"),
     ],
 )

@@ -4,14 +4,20 @@ import contextlib
 import math
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
-from clamp3d import assemble, monte_carlo, placement, sensitivity
+from clamp3d import assemble, load_clamp, monte_carlo, placement, sensitivity
+from clamp3d.baselines import Cas
+from clamp3d.clamp.closing import CLOSING
+from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.section import EDGES, WIRES, D, Section
+from clamp3d.clamp.status import closing_status, seats, stop_words
 from clamp3d.errors import NotClampedError, SolverError, without_numbers
 from clamp3d.geometry.profile import Arc
 from tests.clamp.random_clamps import whole_clamp
@@ -98,7 +104,58 @@ def test_a_wire_on_a_lip_is_clamped_with_a_warning():
     assert run.status == "clamped, but P6 on a lip of both splints' grooves and P7 on a lip of both splints' grooves"
     assert run.clamped
     assert run.passed
-    assert [f.severity for f in run.findings].count("warning") >= 4
+    said = [f.text for f in run.findings if f.severity == "warning"]
+    lips = [f"{w} rests on a lip of the {s} splint's groove, not in its arc" for s in ("up", "down") for w in WIRES]
+    assert said == lips
+
+
+def test_a_wire_that_rolls_out_of_its_groove_touches_one_feature_after_the_other():
+    """By hand: along the up splint's arc, around its lip, along its face, around its edge; P2 is far below."""
+    section, R, r, level = Section(load_clamp(), Cas()), 23.8012, 16.335, 27.726
+    centre, q = np.array([68.5 - 46.0349, 48.7901]), section.open_state(100.0)
+    half, outer = math.acos((centre[1] - level) / R), np.array([0.0, level])
+
+    def away(t):
+        return np.array([math.sin(t), math.cos(t)])
+
+    lip = centre - R * away(half)
+    for feature, words, places in (
+        ("arc", "seated in the groove", [centre - (R - r) * away(t) for t in (0.0, half - 1e-3)]),
+        ("lip", "rests on the lip", [lip + r * away(t) for t in (half, 0.01)]),
+        ("flat face", "rests on the flat face", [0.5 * (lip + outer) + r * away(0.0)]),
+        ("edge", "rests on the edge", [outer + r * away(t) for t in (-0.01, -1.5)]),
+    ):
+        for q[:2] in places:
+            up, _, down, _ = seats(section, q)
+            assert (up.feature, up.detail, up.touches, up.seated) == (feature, words, True, feature == "arc")
+            assert up.in_groove == (feature in ("arc", "lip"))
+            assert (down.detail, down.touches, down.seated, down.in_groove) == ("loose", False, False, False)
+            assert up.gap == pytest.approx(0.0, abs=1e-9)
+    q[:2] = centre - (R - r - 2e-6) * away(0.0)
+    assert [seats(section, q, *reach)[0].detail for reach in ((), (1e-5,))] == ["loose", "seated in the groove"]
+
+
+def test_what_a_status_says_of_a_state():
+    section = Section(load_clamp(), Cas())
+    final = solve_final_state(section)
+
+    def said(by, **more):
+        q = final.q + by * CLOSING
+        return str(closing_status(section, replace(final, q=q, **more)))
+
+    alone = " and ".join(f"{wire} is held by the up splint alone" for wire in WIRES)
+    assert [said(by) for by in (5e-7, 2e-6)] == ["clamped", f"not clamped: {alone}"]
+    assert said(0.0, loose=("P7",)) == "not clamped: P6 alone holds the splints apart, P7 loose"
+    gaps = section.gaps(final.q - 0.5 * CLOSING)
+    a, b = gaps.pair[int(gaps.value.argmin())]
+    assert said(0.0, gaps=gaps) == f"not clamped: {a} overlaps {b} by {-gaps.value.min():.4g} mm"
+    edge = (
+        final.q[D] - 40.0 + math.sqrt(49.23**2 - 22.0**2) - 1.23
+    )  # of the saddle, which has gone up into P1 and wires
+    assert said(-40.0) == f"not clamped: P1 overlaps P3 by {27.726 - edge:.4g} mm"
+    stops = [(("P2", "P4"), "slot"), (("P4", "P6"), "shank"), (("P1", "P2"), "left edge"), (("P1", "P6"), "arc")]
+    words = ["faces meet", "power line rests on the bolt", "the bolt stops the down splint"]
+    assert stop_words([*stops, *stops, (("P2", "P3"), EDGES)]) == [*words, "the saddle's edge stops the down splint"]
 
 
 @pytest.mark.parametrize(
