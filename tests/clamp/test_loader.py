@@ -31,6 +31,7 @@ REFERENCE = resources.files("clamp3d.clamp").joinpath("data/reference.toml").rea
         ("P4 = 2, P5", "P9 = 2, P5", "connections.P1.P9: must be 'P1', 'P2'"),
         ("P4 = { P5 = 1 }", "P5 = { P4 = 1 }", "connections.P5.P4: the matrix is given above its diagonal"),
         ("P4 = { P5 = 1 }", "P4 = { P4 = 1 }", "connections.P4.P4: the matrix is given above its diagonal"),
+        ("[nut]", "[limits]\nline_load = -1\n[nut]", "limits.line_load: must be greater than 0"),
         ("[nut]", "[nut", "not valid TOML"),
         ("[nut]", f"x = {'1' * 5000}\n[nut]", "not valid TOML: Exceeds the limit"),
         ("[nut]", f"x = {'[' * 5000}\n[nut]", "not valid TOML: tables or arrays nested too deeply"),

@@ -5,7 +5,6 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from scipy.optimize import brentq, linprog
 
 from clamp3d import InputError, load_clamp
 from clamp3d.baselines import Cas
-from clamp3d.clamp import loader
 from clamp3d.clamp.dimensions import Limits
 from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand
 from clamp3d.clamp.section import SIZE, D, S, Section
@@ -33,19 +31,19 @@ def finder():
     return made
 
 
+M16 = {"bolt.diameter": 16.0, "bolt.pitch": 2.0, "nut.across_flats": 24.0, "up_splint.hole_diameter": 17.5}
+
+
 @pytest.mark.parametrize(
-    ("friction", "lever"),
-    # by hand: 0.16 * 2.5 = 0.4; 0.58 * (20 - 0.649519 * 2.5) = 10.65820; (30 + 22) / 4 = 13
-    [(0.10, 2.765820), (0.14, 3.712148), (0.20, 5.131640)],
+    ("values", "friction", "lever"),
+    [
+        # by hand: 0.16 * 2.5 = 0.4; 0.58 * (20 - 0.649519 * 2.5) = 10.65820; (30 + 22) / 4 = 13
+        *(({}, *row) for row in ((0.10, 2.765820), (0.14, 3.712148), (0.20, 5.131640))),
+        (M16, 0.12, 2.588187),  # 0.32 + 0.58 * 14.700962 * 0.12 + 10.375 * 0.12
+    ],
 )
-def test_torque_equation_by_hand(friction, lever):
-    assert torque_per_newton(REFERENCE, friction) == pytest.approx(lever, abs=1e-6)
-
-
-def test_torque_equation_with_other_dimensions():
-    # M16 x 2, hole 17.5, across flats 24, friction 0.12: 0.32 + 0.58 * 14.700962 * 0.12 + 10.375 * 0.12
-    m16 = {"bolt.diameter": 16.0, "bolt.pitch": 2.0, "nut.across_flats": 24.0, "up_splint.hole_diameter": 17.5}
-    assert torque_per_newton(changed(REFERENCE, m16), 0.12) == pytest.approx(2.588187, abs=1e-6)
+def test_torque_equation_by_hand(values, friction, lever):
+    assert torque_per_newton(changed(REFERENCE, values), friction) == pytest.approx(lever, abs=1e-6)
 
 
 def test_loads_and_slip_by_hand(run):
@@ -90,16 +88,6 @@ def test_limits_are_reached_at_their_torque(run):
     pull = reached["P7 holds a pull of 2000 N"]
     assert tighten(limited, pull.high).slip["P7"].low == pytest.approx(2000.0)
     assert tighten(limited, pull.low).slip["P7"].high == pytest.approx(2000.0)
-
-
-def test_limits_come_from_the_file(tmp_path):
-    file = tmp_path / "clamp.toml"
-    data = Path(loader.__file__).with_name("data").joinpath("reference.toml").read_text()
-    file.write_text(data + "\n[limits]\nline_load = 200\n")
-    assert load_clamp(file).limits == Limits(line_load=200.0)
-    file.write_text(data + "\n[limits]\nline_load = -1\n")
-    with pytest.raises(InputError, match=r"limits\.line_load"):
-        load_clamp(file)
 
 
 @pytest.mark.parametrize(
