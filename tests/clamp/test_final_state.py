@@ -46,28 +46,6 @@ def test_any_open_start_ends_in_the_same_state(clamp):
         assert solve_final_state(section, start).q == pytest.approx(known, abs=1e-9)
 
 
-def test_bisection_ends_within_its_resolution_of_the_exact_state(clamp):
-    section = Section(clamp, Cas())
-    least = solve_final_state(section).q[D]
-    step = 0.29  # none of its multiples is near the least distance
-    stepped = solve_stepped(section, step=step, tilt_step=TILT_STEP)
-    assert 0.1 < stepped.q[D] - least < step
-    steps = {}
-    for resolution in (0.05, 1e-3):
-        tried = []
-        found = solve_bisection(
-            section, resolution=resolution, step=step, tilt_step=TILT_STEP, progress=lambda *a, t=tried: t.append(a)
-        )
-        assert -1e-9 <= found.q[D] - least <= resolution
-        assert found.gaps.value.min() >= -1e-9
-        assert abs(found.q[S]) <= section.lever * clamp.tilt_stop
-        assert [made for made, _ in tried] == sorted({made for made, _ in tried})
-        assert found.motion_steps >= tried[-1][0]
-        assert tried[-1][1] == pytest.approx(found.q[D], abs=1e-12)
-        steps[resolution] = found.motion_steps
-    assert steps[1e-3] > steps[0.05] > stepped.motion_steps
-
-
 @pytest.mark.parametrize("k", [0, 6, 10])
 def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_free(k):
     """Down from the open clamp, each time at the free tilt next to the last one; at last at the one with most room."""
@@ -89,7 +67,12 @@ def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_
     assert found.motion_steps == tried + len(turns)
     assert k == 10 or found.q[S] == pytest.approx(section.lever * turn * turns[least.argmin()])  # 10: loose wires
     assert found.q[D] == pytest.approx(d + step, abs=1e-9)
-    fine = solve_bisection(section, resolution=0.0625, step=step, tilt_step=turn)
+    fine = solve_bisection(section, resolution=0.0625, step=step, tilt_step=turn, progress=lambda *at: told.append(at))
+    assert told[len(expected) : 2 * len(expected)] == expected
+    made = [count for count, _ in told[len(expected) :]]
+    assert made == sorted({*made})
+    assert fine.motion_steps >= made[-1]
+    assert told[-1][1] == pytest.approx(fine.q[D], abs=1e-12)
     assert fine.q[D] % 0.0625 == pytest.approx(0.0, abs=1e-9)
     if k == 0:  # the saddle's edge stops it
         assert -clamp.tilt_stop <= fine.q[S] / section.lever <= turn / 32.0 - clamp.tilt_stop
