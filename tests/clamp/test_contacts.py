@@ -149,6 +149,8 @@ def test_a_contact_model_measures_its_own_contacts():
     arcs = [c for c in assembly.contacts if c.declared == 3]
     assert all(abs(c.gap) <= 1e-9 and c.distance.method == "chords" for c in arcs)
     assert all(c.distance.lower <= c.gap <= c.distance.upper for c in arcs)
+    saddle = [c.gap for c in assembly.contacts_at(assembly.path[4]) if (c.a, c.b) == ("P2", "P3")]
+    assert saddle == [pytest.approx(0.0, abs=1e-9)]  # drawn up to its chords from the outset
 
 
 def test_moved_parts_are_named_in_the_papers_words(run):

@@ -94,7 +94,7 @@ def test_an_assembly_by_tried_positions_is_the_exact_one_within_its_resolution(r
     assert 0.0 < found.closing - run.closing <= 0.29
     assert run.turns - found.turns == pytest.approx((found.closing - run.closing) / 2.5)
     assert (found.resolution, fine.resolution, run.resolution) == (0.29, 0.01, 1e-6)
-    assert (found.start, found.status) == (run.start, run.status)
+    assert (found.start, found.status, fine.status) == (run.start, run.status, exact.status)
     assert [found.violation, found.optimality, found.others, found.with_play, *found.forces] == [None] * 4
     assert found.work.contact_queries > found.work.motion_steps > told[-1][0] > run.work.motion_steps == 0
     assert [(e.step, e.a, e.b) for e in found.events] == [(e.step, e.a, e.b) for e in run.events]

@@ -16,8 +16,9 @@ from clamp3d.baselines import Cas
 from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.section import EDGES, WIRES, D, Section
+from clamp3d.clamp.section import EDGES, SIZE, WIRES, D, Section
 from clamp3d.clamp.status import closing_status, seats, stop_words
+from clamp3d.clamp.stepped import SteppedState
 from clamp3d.errors import NotClampedError, SolverError, without_numbers
 from clamp3d.geometry.profile import Arc
 from tests.clamp.random_clamps import whole_clamp
@@ -145,14 +146,16 @@ def test_what_a_status_says_of_a_state():
 
     alone = " and ".join(f"{wire} is held by the up splint alone" for wire in WIRES)
     assert [said(by) for by in (5e-7, 2e-6)] == ["clamped", f"not clamped: {alone}"]
-    assert said(0.0, loose=("P7",)) == "not clamped: P6 alone holds the splints apart, P7 loose"
-    gaps = section.gaps(final.q - 0.5 * CLOSING)
+    up = final.q - 1e-5 * np.eye(SIZE)[3]  # the jumper, off the down splint
+    for state in (replace(final, loose=("P7",)), SteppedState(up, section.gaps(up), 0)):
+        assert str(closing_status(section, state)) == "not clamped: P6 alone holds the splints apart, P7 loose"
+    gaps = section.gaps(final.q - 1e-4 * CLOSING)
     a, b = gaps.pair[int(gaps.value.argmin())]
     assert said(0.0, gaps=gaps) == f"not clamped: {a} overlaps {b} by {-gaps.value.min():.4g} mm"
     edge = (
-        final.q[D] - 40.0 + math.sqrt(49.23**2 - 22.0**2) - 1.23
-    )  # of the saddle, which has gone up into P1 and wires
-    assert said(-40.0) == f"not clamped: P1 overlaps P3 by {27.726 - edge:.4g} mm"
+        final.q[D] - 44.0 + math.sqrt(49.23**2 - 22.0**2) - 1.23
+    )  # of the saddle; the down splint overlaps the nut less
+    assert said(-44.0) == f"not clamped: P1 overlaps P3 by {27.726 - edge:.4g} mm"
     stops = [(("P2", "P4"), "slot"), (("P4", "P6"), "shank"), (("P1", "P2"), "left edge"), (("P1", "P6"), "arc")]
     words = ["faces meet", "power line rests on the bolt", "the bolt stops the down splint"]
     assert stop_words([*stops, *stops, (("P2", "P3"), EDGES)]) == [*words, "the saddle's edge stops the down splint"]
