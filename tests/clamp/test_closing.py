@@ -9,6 +9,7 @@ from shapely import LineString
 
 from clamp3d import assemble, load_clamp
 from clamp3d.baselines import Cas
+from clamp3d.clamp.closing import STRIDE
 from clamp3d.clamp.dimensions import GrooveDimensions, Joints
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
@@ -76,6 +77,15 @@ def test_the_saddles_edge_lifts_the_down_splint_off_its_arc_but_no_arc_pulls(joi
         assert any(abs(state.q[D] - final.q[D]) < 1e-8 for state in equilibria(Section(clamp, Cas())))
         assert {c.relation: c.type for c in run.contacts if (c.a, c.b) == ("P2", "P3")} == {"contact": 2}
         assert final.q[U] > 3.0
+
+
+def test_the_down_splint_meets_the_wires_where_a_finer_path_meets_them():
+    section, paths = Section(whole_clamp(np.random.default_rng([61, 8])), Cas()), []
+    for stride in (STRIDE, 0.2 * STRIDE):
+        met = {}
+        solve_final_state(section, stride=stride, on_contact=met.setdefault)
+        paths.append(np.array([met["P2", wire] for wire in WIRES]))
+    assert paths[0] == pytest.approx(paths[1], abs=0.03)
 
 
 def test_forces_on_each_wire_and_on_the_down_splint_balance(run):
