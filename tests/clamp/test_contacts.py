@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from clamp3d import assemble, load_clamp, measure
-from clamp3d.baselines import Chords
+from clamp3d.baselines import Chords, contact_model
 from clamp3d.clamp.contact import measure_contacts, overlap
 from clamp3d.clamp.dimensions import GrooveDimensions
 from clamp3d.clamp.parts import parts
@@ -169,6 +169,7 @@ def test_moved_parts_are_named_in_the_papers_words(run):
         ("P1-P4", {"x": 0.5}, 0, "none", "hole", 0.5),
         ("P1-P4", {"x": -1.0, "y": 100.0}, 2, one_side, "hole", 0.0),
         ("P1-P4", {"x": 1.01}, 2, "overlap", "hole", -0.01),
+        ("P1-P4", {"along": 1.0}, 2, "contact", "hole", 0.0),
         *(("P4-P2", slot(side, 0.0), 2, one_side, "hole", 0.0) for side in (-1, 1)),
         *(("P4-P2", slot(side, t), 2, "one point", "hole", 0.0) for side in (-1, 1) for t in (-0.05, 0.05)),
         ("P4-P5", {"x": 1e-7}, 1, "screw joint", "thread", 0.0),
@@ -190,6 +191,14 @@ def test_moved_parts_are_named_in_the_papers_words(run):
         assert gap is None or c.gap == pytest.approx(gap, abs=2e-7)
         sure = "at least " * (names != "P1-P2")  # bodies of which one bound is attested
         assert overlap(c) == (f"{c.a} overlaps {c.b} by {sure}{-c.gap:.4g} mm" if c.gap < -1e-6 else "")
+
+
+@pytest.mark.parametrize(("by", "kind"), [({}, (3, "arc")), ({"x": -12.4, "y": 2.687}, (2, "flat face"))])
+def test_points_of_meshes_are_of_the_surfaces_that_they_approximate(run, by, kind):
+    wire = run.poses["P6"]
+    poses = {**run.poses, "P6": replace(wire, **{key: getattr(wire, key) + value for key, value in by.items()})}
+    (c,) = measure_contacts(run.clamp, poses, contact_model("mesh", parts(run.clamp)), pairs=[("P1", "P6")])
+    assert (c.type, c.feature) == kind
 
 
 @pytest.mark.parametrize("part", ["P1", "P2", "P3", "P5", "P6"])
