@@ -8,6 +8,7 @@ import pytest
 from clamp3d import InputError, load_clamp, monte_carlo, placement, sensitivity
 from clamp3d.baselines import Cas
 from clamp3d.clamp import tolerance as montecarlo
+from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.sensitivity import DIMENSIONS, dimension, with_dimensions
@@ -20,11 +21,13 @@ def _distance(clamp, near):
     return section.splint_distance(solve_final_state(section, start).q)
 
 
-# Wires in the arcs, and a line too thick for its grooves: it rests on lips.
-@pytest.mark.parametrize(("line", "jumper"), [(None, None), ("48", "47.8")])
-def test_derivatives_are_the_solvers_differences(line, jumper):
-    clamp = load_clamp(line=line, jumper=jumper)
+# Wires in the arcs, also where bolt and round back have play, and a line too thick for its grooves: it rests on lips.
+@pytest.mark.parametrize(("line", "jumper", "play"), [(None, None, False), (None, None, True), ("48", "47.8", False)])
+def test_derivatives_are_the_solvers_differences(line, jumper, play):
+    clamp = replace(load_clamp(line=line, jumper=jumper), joints=Joints(hole=play, saddle=play))
     rows = {row.name: row for row in sensitivity(clamp)}
+    assert np.diff([abs(row.derivative) for row in rows.values()]).max() <= 1e-8
+    assert ("up_splint.hole_diameter" in rows) == play
     assert 0 < len(rows) < len(DIMENSIONS)
     assert all(abs(row.derivative) > 1e-8 for row in rows.values())  # what has no influence is not listed
     near = solve_final_state(Section(clamp, Cas()))
@@ -43,6 +46,12 @@ def test_derivatives_are_the_solvers_differences(line, jumper):
         )
         derivative = rows[name].derivative if name in rows else 0.0
         assert derivative == pytest.approx((4 * narrow - wide) / 3, rel=1e-5, abs=1e-8), name
+
+
+def test_a_state_that_is_not_isolated_has_no_derivatives():
+    joints = Joints(hole=True, saddle=True, washer=True)
+    with pytest.raises(SolverError, match="the final state is not isolated"):
+        sensitivity(replace(load_clamp(), joints=joints))
 
 
 def test_samples_do_not_depend_on_where_they_run(monkeypatch):
@@ -77,6 +86,7 @@ def test_dimensions_scatter_by_their_tolerances(distribution, spread):
     clamp = load_clamp()
     spec = monte_carlo(clamp, n=1, distribution=distribution, wire_tolerance_percent=2.0).spec
     tolerance = dict(zip(DIMENSIONS, spec.tolerance, strict=True))
+    assert len(tolerance) == 23
     chosen = ("line.diameter", "jumper.diameter", "up_splint.width", "up_splint.line_groove.radius", "saddle.radius")
     assert [tolerance[name] for name in chosen] == pytest.approx([0.6534, 0.285, 0.5, 0.2, 0.3])
     drawn = [montecarlo.sample_dimensions(spec, k) for k in range(400)]
