@@ -47,7 +47,8 @@ BALANCED = 1e-6
 """Largest unbalanced force of a certificate in parts of the bolt force: what gaps of `CLOSED` turn normals by."""
 MOST_FRICTION = 1.0  # chosen: a friction angle of 45 degrees
 _TILTS, _SHARES, _ROUNDS = 300, 11, 7
-"""Samples of the search: tilts to either side, distances a tilt, and how often it is narrowed (300-fold each)."""
+"""Samples of the search: tilts to either side, distances a tilt, and how often it is narrowed (30-fold each)."""
+_BESIDE = 10  # samples to either side that stay: where an arc ends, the best of all is not next to the best sample
 _TILTS_BEYOND = 201  # chosen: each costs some linear programs
 
 
@@ -232,7 +233,7 @@ class FrictionBand:
             i, j = divmod(int(score.argmin()), len(share))
             if score[i, j] < best[0]:
                 best = float(score[i, j]), float(d[i, j]), float(tilt[i])
-            low, high = max(i - 1, 0), min(i + 1, len(tilt) - 1)
+            low, high = max(i - _BESIDE, 0), min(i + _BESIDE, len(tilt) - 1)
             tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
             tilt.sort()
             near = np.linspace(share[max(j - 1, 0)], share[min(j + 1, len(share) - 1)], _SHARES)

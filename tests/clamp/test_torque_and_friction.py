@@ -227,6 +227,13 @@ def test_symmetric_clamp_in_closed_form():
     )
 
 
+def test_bands_of_more_friction_hold_those_of_less_up_to_where_the_arcs_end(finder):
+    ends = np.array([finder.ends(friction) for friction in (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.7, 0.85, 1.0)])
+    assert (np.diff(ends, axis=0) * (-1.0, 1.0)).min() >= -1e-6
+    proven = finder.band(1.0)
+    assert (proven.least.distance, proven.greatest.distance) == pytest.approx(ends[-1], abs=1e-9)
+
+
 def test_certificates(finder):
     band = finder.band(0.1)
     for end, beyond in ((band.least, -1.0), (band.greatest, 1.0)):
