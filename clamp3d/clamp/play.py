@@ -196,8 +196,7 @@ def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
     end, travel = section.poses(closing.end), d - float(closing.end[D])
     log.reach(step.name, "nut tightened", end)
     log.touch(step.name, [("P2", "P3")], section.poses(seated), d - float(seated[D]))
-    tight: list[Pair] = [pair for pair in (("P1", "P5"), ("P3", "P4")) if section.clamp.connection(*pair)]
-    log.touch(step.name, tight, end, travel)
+    log.touch(step.name, [("P1", "P5"), ("P3", "P4")], end, travel)
     return travel
 
 

@@ -71,6 +71,7 @@ def test_every_difference_from_the_declared_matrix_is_named():
     assert assembly.clamped
     (undeclared,) = assembly.undeclared
     assert (undeclared.a, undeclared.b, undeclared.declared, undeclared.measured) == ("P3", "P4", 0, 2)
+    assert undeclared.where == "P5|P3P4"
     assert undeclared.gap == pytest.approx(0.0, abs=1e-9)  # of the final state, not only somewhere on the way
     assert (assembly.findings[0].severity, assembly.findings[0].text) == ("error", str(undeclared))
     severity = {f.text[:5]: f.severity for f in assembly.findings if f.severity != "error"}

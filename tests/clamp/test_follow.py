@@ -14,6 +14,7 @@ from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.play import Log
 from clamp3d.clamp.section import Section
+from clamp3d.clamp.surfaces import surfaces_at
 from clamp3d.clamp.ways import Insertion, out
 from clamp3d.errors import SequenceError
 from clamp3d.kernel import translation
@@ -55,7 +56,7 @@ def overlaps_on(path, steps=3):
 @pytest.mark.parametrize(
     "sequence",
     [
-        "P1 -> P7 -> P2 -> P3|P4 -> P5",
+        "P2 -> P2 -> P7 -> P1 -> P3|P4 -> P5",
         "P4|P3 -> P2 -> P1 -> P5 -> P1|P2P3P4P5 -> P7 -> P2 -> P5|P3P4",
     ],
 )
@@ -82,7 +83,12 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
     assert [travel for travel, _ in arrived] == pytest.approx([way for _, way in arrived])
     (ends,) = [w.poses for w in run.path if w.label == "nut on the bolt's end"]
     assert ends["P5"].y + run.clamp.nut.height == pytest.approx(ends["P4"].y, abs=1e-9)
-    assert len({w.step for w in run.path}) == sequence.count("->") + 1 + 2 * ("P5|" not in sequence)
+    assert len({w.step for w in run.path}) == sequence.count("->") + 1 + ("P5|" not in sequence)
+    drawn = run.path[-2].poses["P4"].y - run.path[-1].poses["P4"].y
+    assert run.events[-1].travel == pytest.approx(drawn)
+    assert all(e.a < e.b for e in run.events)
+    met = [w.label for w in run.path if "down splint touches" in w.label]  # the jumper waits while P2 is closed first
+    assert met == [f"down splint touches {wire}" for wire in ("P6", "P7")[: 1 + ("P5|" in sequence)]]
 
 
 def test_what_waits_is_shifted_in_the_world_and_in_plain_data(run):
@@ -124,6 +130,9 @@ def test_a_blocked_step_names_pair_place_and_instant(sequence, step, pair, trave
     assert set(motion.parts) == ({"P7"} if travel is None else {"P3", "P4"})
     T = {part.name: part.T_world for part in scene.parts}
     assert set(motion.parts) | {first.b, "P6"} <= set(T)
+    touching = translation(*(first.travel / first.way * motion.travel)) @ T[first.a]
+    for name, pose in ((first.a, touching), (first.b, T[first.b])):
+        assert surfaces_at(parts(load_clamp())[name], pose, first.point, 2e-3)
     for off, meets in ((0.2, True), (-0.2, False)):
         moved = translation(*((first.travel + off) / first.way * motion.travel)) @ T[first.a]
         assert (volume(first.a, moved, first.b, T[first.b]) > 1e-6) == meets

@@ -8,7 +8,7 @@ from clamp3d import load_clamp
 from clamp3d.clamp.dimensions import PARTS
 from clamp3d.clamp.ways import DIRECTIONS, Insertion, out
 from clamp3d.engine.model import ModelCache
-from tests.clamp.orders import has_way, open_bodies, questions
+from tests.clamp.orders import LATTICE, has_way, open_bodies, questions, steps_out
 
 COUNT = int(os.environ.get("CLAMP3D_ORDERS", "4"))
 """How many of the 192 questions are put to the search: each takes some seconds."""
@@ -22,6 +22,10 @@ def test_the_search_finds_a_way_where_there_is_one(run):
         part, others = asked[k]
         legs = Insertion(clamp, [(part, other) for other in others], place, cache).way_out()
         assert bool(legs) == has_way(part, others), (part, others, legs)
+        if len(legs) == 1:  # until the boxes are apart, and 20 mm more
+            ((origin, length),) = legs
+            far = LATTICE * steps_out(part, others, np.zeros(3), out(origin))
+            assert -0.1 < far + 20.0 - length < LATTICE + 0.1
     open_bodies.cache_clear()  # before Python ends, or the library reports what is left
 
 
