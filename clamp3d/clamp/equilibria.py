@@ -116,7 +116,7 @@ def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:
 
 
 def initial_guesses(section: Section) -> list[Array]:
-    """Open states q (10,), each just above a local minimum of the feasible distance; the lowest first."""
+    """Open states q (10,), each just above a local minimum of the feasible distance."""
     limit, lever = section.clamp.tilt_stops["the slot"], section.lever
     tilts = np.linspace(-limit, limit, _TILTS)
     lifted = section.clamp.lifted(tilts)
@@ -137,7 +137,6 @@ def initial_guesses(section: Section) -> list[Array]:
             q[D], q[S], q[U] = here, lever * tilt, lifted[k]
             q[:2], q[2:4] = line.place(k, a, here - lifted[k]), jumper.place(k, b, here - lifted[k])
             guesses.append(q)
-    guesses.sort(key=lambda q: float(q[D]))
     step = _CLEAR * min(section.clamp.line.radius, section.clamp.jumper.radius)
     return [opened for q in guesses if (opened := open_up(section, q, step)) is not None]
 
