@@ -84,8 +84,7 @@ def test_parts_that_come_one_by_one_overlap_nowhere_and_end_in_the_same_clamp(se
     (ends,) = [w.poses for w in run.path if w.label == "nut on the bolt's end"]
     assert ends["P5"].y + run.clamp.nut.height == pytest.approx(ends["P4"].y, abs=1e-9)
     assert len({w.step for w in run.path}) == sequence.count("->") + 1 + ("P5|" not in sequence)
-    drawn = run.path[-2].poses["P4"].y - run.path[-1].poses["P4"].y
-    assert run.events[-1].travel == pytest.approx(drawn)
+    assert run.events[-1].travel == pytest.approx(run.path[-2].poses["P4"].y - run.path[-1].poses["P4"].y)
     assert all(e.a < e.b for e in run.events)
     met = [w.label for w in run.path if "down splint touches" in w.label]  # the jumper waits while P2 is closed first
     assert met == [f"down splint touches {wire}" for wire in ("P6", "P7")[: 1 + ("P5|" in sequence)]]

@@ -88,11 +88,9 @@ WIDE = {"hole_diameter": 97.9, "width": 98.0, "length": 100.0}
     ],
 )
 def test_wide_holes_have_the_volume_of_their_mesh(name, values):
-    clamp = changed(CLAMP, values | {"down_splint.max_tilt_deg": None})
-    part = parts(clamp)[name]
+    part = parts(changed(CLAMP, values | {"down_splint.max_tilt_deg": None}))[name]
     low, high = volume_bounds(part, 1e-4)
     assert low < mesh(part, 1e-4).volume < high
-    assert (clamp.down_splint.slot_bottom == clamp.down_splint.underside_depth) == (name == "P2")
 
 
 def test_bad_values_say_what_is_wrong():
