@@ -122,6 +122,8 @@ def test_a_bolt_that_does_not_fill_the_nut_does_not_clamp(lacking, run):
     made = assemble(replace(clamp, bolt=replace(clamp.bolt, shank_length=through - lacking)), Cas())
     short = f"not clamped: the bolt is {lacking:.4g} mm too short for the nut"
     assert made.status == ("clamped" if lacking < 0.0 else short)
+    loose = replace(load_clamp(line="LJ-16", jumper="LJ-16"), bolt=made.clamp.bolt)
+    assert assemble(loose).status == "not clamped: faces meet, P6 and P7 loose"
     gaps = {(c.a, c.b): c.gap for c in made.contacts}
     assert gaps["P4", "P5"] == pytest.approx(max(0.0, lacking - clamp.nut.height), abs=1e-6)
     assert np.isfinite(list(gaps.values())).all()
