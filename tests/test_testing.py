@@ -10,17 +10,8 @@ from clamp3d import Cylinder, Distance, Motion, distance, first_contact, load_cl
 from clamp3d.clamp.parts import parts
 from clamp3d.geometry.meshing import chord_error
 from clamp3d.geometry.pose import inverse
-from clamp3d.kernel import rotation, translation
-from clamp3d.shapes import SweptArc
-from clamp3d.testing import (
-    Body,
-    assert_distance,
-    assert_lower_on_way,
-    assert_motion,
-    body,
-    common,
-    separation,
-)
+from clamp3d.kernel import SweptArc, rotation, translation
+from clamp3d.testing import Body, assert_distance, assert_lower_on_way, assert_motion, body, common, separation
 from tests.kinds import BLOCK, DRAWN, faceted_shape
 
 BALL = Body(lambda x: np.linalg.norm(x, axis=1) - 2.0, np.array([[-2.0] * 3, [2.0] * 3]))

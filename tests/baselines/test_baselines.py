@@ -12,8 +12,7 @@ from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.parts import parts
-from clamp3d.geometry.pose import inverse
-from clamp3d.kernel import rotation, translation
+from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.shapes import SweptArc, mesh
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)

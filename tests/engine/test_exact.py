@@ -7,11 +7,6 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from OCP.BRep import BRep_Builder
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeSolid
-from OCP.gp import gp_Ax3, gp_Sphere
-from OCP.TopoDS import TopoDS_Shell
 
 from clamp3d.engine import moving_pair
 from clamp3d.engine.answer import Distance
@@ -22,8 +17,8 @@ from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.refine import refine
 from clamp3d.engine.surface import Surface
 from clamp3d.engine.verdict import Thresholds
-from clamp3d.files import boundary, cad_process, pairs
-from clamp3d.files.open_cascade import to_bytes
+from clamp3d.files import cad_process, pairs
+from clamp3d.files.open_cascade import occ, to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
@@ -191,12 +186,12 @@ def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
 
 
 def test_only_a_whole_ball_counts_as_one():
-    both = BRepAlgoAPI_Fuse(ball(5.0), ball(5.0, 4.0)).Shape()
-    half = BRepBuilderAPI_MakeFace(gp_Sphere(gp_Ax3(), 5.0), 0.0, np.pi, -np.pi / 2, np.pi / 2).Face()
-    builder, open_shell = BRep_Builder(), TopoDS_Shell()
+    both = occ.BRepAlgoAPI_Fuse(ball(5.0), ball(5.0, 4.0)).Shape()
+    half = occ.BRepBuilderAPI_MakeFace(occ.gp_Sphere(occ.gp_Ax3(), 5.0), 0.0, np.pi, -np.pi / 2, np.pi / 2).Face()
+    builder, open_shell = occ.BRep_Builder(), occ.TopoDS_Shell()
     builder.MakeShell(open_shell)
     builder.Add(open_shell, half)
-    for solid in (first_solid(both), BRepBuilderAPI_MakeSolid(open_shell).Solid(), block((0, 0, 0), (1, 1, 1))):
+    for solid in (first_solid(both), occ.BRepBuilderAPI_MakeSolid(open_shell).Solid(), block((0, 0, 0), (1, 1, 1))):
         assert pairs._ball(to_bytes(solid)) is None
     assert pairs._ball(to_bytes(ball(5.0, 4.0)))[1] == pytest.approx(5.0, abs=1e-12)
 
@@ -235,7 +230,7 @@ def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monke
 
     class Wrong:
         def __init__(self, _):
-            self.State = lambda: getattr(boundary.occ.TopAbs_State, state)
+            self.State = lambda: getattr(occ.TopAbs_State, state)
 
         def Perform(self, *_):
             pass
@@ -245,7 +240,7 @@ def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monke
     for is_wrong in (True, False):
         with monkeypatch.context() as patch:
             if is_wrong:
-                patch.setattr(boundary.occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
+                patch.setattr(occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
             assert pairs.depths(angle, at_edges) == pytest.approx([-(2.0**0.5) if is_wrong else 2.0**0.5, -5.0])
             assert pairs.depths(angle, in_faces) == pytest.approx([1.0, -1.0])
 

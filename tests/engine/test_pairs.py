@@ -14,9 +14,8 @@ from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.verdict import Thresholds
-from clamp3d.geometry.pose import to_target
-from clamp3d.kernel import SweptArc, rotation, translation
-from clamp3d.shapes import MeshShape, make_mesh
+from clamp3d.geometry.pose import rotation, to_target, translation
+from clamp3d.shapes import MeshShape, SweptArc, make_mesh
 from tests.kinds import measured_alike, mesh_shape
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5

@@ -14,16 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clamp3d import Distance, InputError, Motion, Part, Scene, Verdict, check_poses, shapes
+from clamp3d import Cylinder, Distance, InputError, Motion, Part, Scene, Verdict, check_poses, shapes
 from clamp3d.engine.broad import Boxes, near_pairs
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds
-from clamp3d.geometry.meshing import mesh
-from clamp3d.geometry.pose import to_target
+from clamp3d.geometry.pose import rotation, to_target, translation
 from clamp3d.geometry.profile import Arc, Profile, Segment
-from clamp3d.kernel import Cylinder, SweptArc, rotation, translation
-from clamp3d.shapes import make_mesh
+from clamp3d.shapes import SweptArc, make_mesh, mesh
 from tests.kinds import measured_alike
 
 ROOT = Path(__file__).resolve().parents[2]

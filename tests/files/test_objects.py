@@ -44,12 +44,11 @@ def test_what_is_no_body_is_refused():
 
 def test_shapes_of_open_cascade_and_of_cadquery():
     pytest.importorskip("OCP")
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-    from tests.cad import location, random_pose
+    from tests.cad import location, occ, random_pose
     from tests.files.step_scenes import pin, plate
 
-    assert volumes(load(BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
+    assert volumes(load(occ.BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
     # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.
     T, S = random_pose(np.random.default_rng(1)), random_pose(np.random.default_rng(2))
     held = SimpleNamespace(wrapped=pin())

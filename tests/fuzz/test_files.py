@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clamp3d import shapes
-from clamp3d.kernel import SweptArc
-from clamp3d.shapes import mesh
+from clamp3d.shapes import SweptArc, mesh
 from tests.fuzz.rules import assert_outputs, call, examples, is_refused, new_folder
 from tests.fuzz.samples import CLAMP, SCENE, TETRA
 from tests.fuzz.spoil import pick, power, spoil, spoil_bytes, to_toml

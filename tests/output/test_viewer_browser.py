@@ -18,8 +18,7 @@ import pytest
 
 import clamp3d.output.viewer
 from clamp3d import Motion, Scene, check, fit_mesh, measure, shapes, view
-from clamp3d.geometry.pose import nearest_rigid
-from clamp3d.kernel import translation
+from clamp3d.geometry.pose import nearest_rigid, translation
 from clamp3d.output.fit_report import fit_to_html
 from clamp3d.output.groups import grouped
 from clamp3d.output.palette import PART_COLOURS

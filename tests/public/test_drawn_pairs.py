@@ -121,10 +121,9 @@ PAIRS = ["box-cylinder", "cylinder-cylinder", "tube-box", "tube-cylinder", "plat
 @pytest.mark.parametrize("pair", PAIRS)
 def test_random_poses_as_open_cascade_measures_them(pair):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
     from clamp3d.output.step import solid
-    from tests.cad import common_volume, moved, random_pose
+    from tests.cad import common_volume, moved, occ, random_pose
 
     one, two = (BODIES[name] for name in pair.split("-"))
     rng = np.random.default_rng(len(pair))
@@ -132,7 +131,7 @@ def test_random_poses_as_open_cascade_measures_them(pair):
     for k in range(10):
         T = random_pose(rng, 6.0 if k % 2 else 14.0)
         a, b = solid(one), moved(solid(two), T)
-        truth, measured = BRepExtrema_DistShapeShape(a, b).Value(), distance(one, two, T)
+        truth, measured = occ.BRepExtrema_DistShapeShape(a, b).Value(), distance(one, two, T)
         seen.add(truth > 0.0)
         if truth > 0.0:
             exactly(truth, measured, 2e-6)
@@ -140,7 +139,7 @@ def test_random_poses_as_open_cascade_measures_them(pair):
             assert measured.upper < 0.0
             for way in rng.normal(size=(4, 3)):  # no shorter translation parts them
                 near = moved(b, translation(*(0.99 * -measured.upper * way / np.linalg.norm(way))))
-                assert BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
+                assert occ.BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
             if measured.normal is not None and math.isfinite(measured.lower):
                 free = moved(b, translation(*(-measured.lower * measured.normal)))
                 assert common_volume(a, free) < 1e-4
