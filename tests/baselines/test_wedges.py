@@ -8,13 +8,14 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clamp3d import InputError, load_clamp
+from clamp3d import load_clamp
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.clamp.parts import parts
 from clamp3d.geometry.profile import Arc
 from clamp3d.shapes import SweptArc
+from tests.refusals import refusals
 
 
 def assert_filled_once(wedges, outline):
@@ -62,9 +63,7 @@ def test_clamp_parts_are_filled_once(name, unit_deg):
         assert len(convex(prism(wedge.polygon, -30.0, 30.0)).solid.vertices) == 2 * len(wedge.polygon)
 
 
-def test_parts_without_wedges_are_refused():
-    clamp = parts(load_clamp())
-    with pytest.raises(InputError, match="part P6 must have a groove"):
-        part_wedges(clamp["P6"], 0.1)
-    with pytest.raises(InputError, match="part P4 must be one body"):
-        part_wedges(clamp["P4"], 0.1)
+test_parts_without_wedges_are_refused = refusals(
+    (lambda: part_wedges(parts(load_clamp())["P6"], 0.1), "part P6 must have a groove"),
+    (lambda: part_wedges(parts(load_clamp())["P4"], 0.1), "part P4 must be one body"),
+)
