@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from hypothesis import strategies as st
 
+from clamp3d import Scene
 from clamp3d.engine.check import check
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry import shapes
@@ -56,6 +57,12 @@ def mesh_shape(made, fit="off", **more):
     return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, **more)
 
 
+def manifold_shape(made, fit="off", **more):
+    """A body of manifold3d as a shape."""
+    mesh = made.to_mesh64()
+    return shapes.MeshShape(make_mesh(np.array(mesh.vert_properties)[:, :3], mesh.tri_verts), fit, **more)
+
+
 def faceted_shape(solid, error, fit="off"):
     """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
     return mesh_shape(mesh(solid, error), fit, name=solid.name)
@@ -70,6 +77,12 @@ def poses(reach):
     angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
     axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
     return st.builds(pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))
+
+
+def row_of(a, b, T, *, distances=False, **scene):
+    """The one row of the check of two parts."""
+    (row,) = check(Scene(**scene).add("a", a).add("b", b, T), distances=distances).pairs
+    return row
 
 
 def measured_alike(scene, result):

@@ -82,7 +82,7 @@ def assert_plausible(code, data):
 
 
 def bad_mesh(draw):
-    """The grooved block of another size, far away, flat, rough or twice; tests/baselines/test_solid.py has more."""
+    """The grooved block of another size, far away, flat, rough or twice; tests/geometry/test_mesh.py has more."""
     V, F = np.array(BLOCK.vertices), np.array(BLOCK.faces)
     rough = np.random.default_rng(draw(st.integers(0, 2**32 - 1))).normal(0.0, power(draw, -6, 1), V.shape)
     changed = [V * power(draw, -40, 40), V + power(draw, 0, 38), V * [1.0, 0.0, 1.0], V + rough]

@@ -1,4 +1,4 @@
-"""The report: rows against the geometry they describe, files against each other, the page in a browser's terms."""
+"""The report: rows against the geometry they describe, files against each other, one answer in every output."""
 
 import base64
 import csv
@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clamp3d import Motion, Scene, assemble, measure, report, shapes
+from clamp3d import Motion, Scene, assemble, check, measure, report, shapes, view
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.kernel import translation
 from clamp3d.output.report import make_report
-from clamp3d.output.report_page import report_html, write_report
+from clamp3d.output.report_page import report_csv, report_html, report_to_dict, write_report
+from clamp3d.output.scene_report import check_to_dict
 from tests.cli.boxes import boxes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -178,3 +179,29 @@ def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, main):
     assert [(p["a"], p["b"], p["verdict"]) for p in data["pairs"]] == [("a", "b", "clash")]
     assert main("report", ROOT / "examples" / "hinge" / "pin.stl", "-q", "-o", "pin")[0] == 0
     assert "mesh pin.stl of 216 triangles" in (tmp_path / "pin" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("wires", [{}, {"line": "LGJ-240/40", "jumper": "12.5"}])
+def test_every_output_says_the_same(wires, reference_report):
+    found = make_report(assemble(**wires)) if wires else reference_report
+    assembly = found.assembly
+    truth = measure(assembly.scene)
+    assert len(truth) == 21
+    checked = check_to_dict(check(assembly.scene, distances=True))["pairs"]
+    with view(assembly, serve=False, mesh_error=0.5) as viewer:
+        shown = viewer.story["stops"][-1]["rows"]
+    outputs = {
+        "run": assembly.to_dict()["contacts"],
+        "report.json": report_to_dict(found)["pairs"],
+        "pairs.csv": list(csv.DictReader(io.StringIO(report_csv(found)))),
+        "check": checked,
+        "viewer": shown,
+    }
+    for name, rows in outputs.items():
+        assert {frozenset((row["a"], row["b"])) for row in rows} == {frozenset(pair) for pair in truth}, name
+        for row in rows:
+            exact = truth.get((row["a"], row["b"])) or truth[row["b"], row["a"]]
+            assert float(row["distance_mm"]) == pytest.approx(exact.value, abs=1e-9), (name, row["a"], row["b"])
+    for row in checked:
+        if row["at_least_mm"] is not None:
+            assert row["at_least_mm"] <= row["distance_mm"] <= row["at_most_mm"]
