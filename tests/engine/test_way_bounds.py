@@ -24,15 +24,9 @@ SLOW = settings(
 FACETED = [faceted_shape(shape, 0.3) for shape in DRAWN]
 CACHE = ModelCache()
 vector = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
-screws = st.builds(
-    lambda axis, angle, point, travel: Motion.screw(axis, angle, point=np.multiply(10.0, point), travel=travel),
-    vector,
-    st.floats(-2.5, 2.5),
-    vector,
-    st.floats(-25.0, 25.0),
-)
-straight = st.builds(lambda by: Motion.translate(np.multiply(40.0, by)), vector)
-ways = st.one_of(screws, straight)
+points = vector.map(lambda v: 10.0 * np.array(v))
+screws = st.builds(Motion.screw, vector, st.floats(-2.5, 2.5), point=points, travel=st.floats(-25.0, 25.0))
+ways = screws | vector.map(lambda v: Motion.translate(40.0 * np.array(v)))
 
 
 @settings(SLOW, max_examples=7)
@@ -70,10 +64,8 @@ def test_least_distances_and_first_contacts(monkeypatch, a, b, way, start):
 @pytest.mark.parametrize("outer", [shapes.box((60.0, 60.0, 60.0)), faceted_shape(shapes.box((60.0, 60.0, 60.0)), 0.3)])
 def test_what_is_inside_all_the_time_overlaps_all_the_time(outer):
     """No surface meets another on the way, and yet there is no clearance at any time, and contact from the start."""
-    for way, inner in (
-        (Motion.translate((3.0, 2.0, -1.0)), DRAWN[0]),
-        (Motion.screw((1.0, 2.0, 3.0), 0.4), FACETED[4]),
-    ):
+    ways = Motion.translate((3.0, 2.0, -1.0)), Motion.screw((1.0, 2.0, 3.0), 0.4)
+    for way, inner in zip(ways, (DRAWN[0], FACETED[4]), strict=True):
         for a, b in ((outer, inner), (inner, outer)):
             start = translation(1.0, 1.0, 1.0)
             hit, least = first_contact(a, b, way, start), min_clearance(a, b, way, start)
@@ -141,12 +133,8 @@ def test_bounds_of_a_stretch_are_near_what_is_least_on_it():
             bounds.append(swept_lower(plate, part, places[0], places[20], places[40], angle=0.5 * angle))
             truths.append(min(P[2, 3] - r for P, r in zip(places, reach, strict=True)) - 2.0)
         assert_tight(bounds, truths, math.inf if angle > 1.0 else 0.12 if radius else 0.05)
-    pin, tube, bounds, truths = (
-        CACHE.model(shapes.cylinder(2.0, 10.0)),
-        CACHE.model(shapes.cylinder(6.0, 8.0, bore=2.5)),
-        [],
-        [],
-    )
+    pin, tube = CACHE.model(shapes.cylinder(2.0, 10.0)), CACHE.model(shapes.cylinder(6.0, 8.0, bore=2.5))
+    bounds, truths = [], []
     for k in range(12):
         way = Motion.screw(rng.normal(size=3), 0.01 * (k % 3), point=rng.normal(size=3), travel=0.02)
         way = replace(way, travel=way.travel + 6.0 * np.eye(3)[2])
@@ -161,10 +149,8 @@ def test_bounds_of_a_stretch_are_near_what_is_least_on_it():
 def test_bounds_of_a_stretch_in_a_groove_are_near_what_is_least_on_it():
     rng, bounds, truths = np.random.default_rng(6), [], []
     for k in range(60):
-        groove, pin = (
-            SweptArc(7.0, rng.uniform(0.5, 2.0), 30.0),
-            (Cylinder, Capsule)[k % 2](rng.uniform(1.0, 6.5), 20.0),
-        )
+        groove = SweptArc(7.0, rng.uniform(0.5, 2.0), 30.0)
+        pin = (Cylinder, Capsule)[k % 2](rng.uniform(1.0, 6.5), 20.0)
         T = rotation(rng.normal(size=3), rng.choice([0.0, 0.01, 1.0]))
         T[:3, 3] = rng.normal(size=3) * (3.0, 3.0, 9.0)
         way = Motion.screw(rng.normal(size=3), rng.choice([0.0, 0.02]), point=10.0 * rng.normal(size=3), travel=0.3)
