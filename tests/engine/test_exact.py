@@ -170,8 +170,8 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
 @pytest.mark.parametrize("family", ["balls", "ball_on_plate", "ball_in_socket", "ball_in_cone", "ball_in_ring"])
 def test_the_overlap_of_a_ball_is_its_radius_less_the_distance_of_its_centre(family, splines):
     # Open CASCADE takes seconds where a ball is concentric with a socket of splines.
-    every = 3 if family == "ball_in_socket" and splines else 1
-    for seed, gap in ((1, -0.0098), (2, -1e-4), (3, 0.0), (4, 0.03))[::every]:
+    count = 1 if family == "ball_in_socket" and splines else 4
+    for seed, gap in ((1, -0.0098), (2, -1e-4), (3, 0.0), (4, 0.03))[:count]:
         a, b = models(family, gap, seed, splines)
         distance = exact_distance(a, b, np.eye(4))
         assert distance.lower <= gap <= distance.upper

@@ -132,7 +132,7 @@ def test_cylinder_wire_and_blind_hole():
         trimesh.creation.icosphere(subdivisions=3, radius=10.0),
         trimesh.creation.cone(10.0, 20.0, sections=48),
         trimesh.creation.cylinder(10.0, 20.0, sections=6),  # a hexagon is a nut
-        trimesh.creation.torus(200.0, 50.0, major_sections=24, minor_sections=16),
+        trimesh.creation.torus(200.0, 50.0, major_sections=16, minor_sections=12),
     ],
     ids=["box", "sphere", "cone", "hexagon", "torus"],
 )
