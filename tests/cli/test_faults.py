@@ -14,6 +14,7 @@ from tests.cli.boxes import boxes
 
 COMMAND = [sys.executable, "-m", "clamp3d"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
 
 
@@ -85,9 +86,7 @@ class TestStreams:
     @pytest.mark.parametrize("arguments", [(), ("--json", "-")])
     def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(self, arguments, tmp_path):
         boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
-        with subprocess.Popen(
-            [*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        ) as process:
+        with subprocess.Popen([*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], **PIPES) as process:
             process.stdout.close()
             assert process.stderr.read() == b"" or arguments
             assert process.wait(120) == 1
@@ -100,7 +99,7 @@ class TestStreams:
     def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, stream, count, tmp_path):
         boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
         with open("/dev/full", "w") as full:
-            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
+            streams = PIPES | {stream: full}
             done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
         said = done.stderr or b""
         assert done.returncode == 2
@@ -108,24 +107,21 @@ class TestStreams:
 
 
 @posix
-class TestEnd:
-    def test_when_asked_to_end_nothing_is_left(self, tmp_path):
-        """The decomposition of a splint takes tens of seconds in a process of its own."""
-        temporary = tmp_path / "tmp"
-        temporary.mkdir()
-        env = ENVIRONMENT | {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
-        with subprocess.Popen(
-            [*COMMAND, "run", "-q", "--method", "hulls"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env
-        ) as process:
-            until(lambda: _children(process.pid))
-            workers = _children(process.pid)
-            process.send_signal(signal.SIGTERM)
-            out, err = process.communicate(timeout=60)
-        lines = err.decode().splitlines()
-        said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
-        assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
-        assert list(temporary.iterdir()) == []
-        until(lambda: not any(alive(worker) for worker in workers))
+def test_when_asked_to_end_nothing_is_left(tmp_path):
+    """The decomposition of a splint takes tens of seconds in a process of its own."""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    env = ENVIRONMENT | {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
+    with subprocess.Popen([*COMMAND, "run", "-q", "--method", "hulls"], **PIPES, env=env) as process:
+        until(lambda: _children(process.pid))
+        workers = _children(process.pid)
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+    lines = err.decode().splitlines()
+    said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
+    assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
+    assert list(temporary.iterdir()) == []
+    until(lambda: not any(alive(worker) for worker in workers))
 
 
 def until(condition):
@@ -152,14 +148,10 @@ def test_an_interrupt_ends_the_program_also_while_a_library_that_ignores_it_is_i
         "import time\nprint('here', flush=True)\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    pass\n"
     )
     code = "from clamp3d.cli.terminal import end_on_signals; end_on_signals(); import stubborn; print('went on')"
-    path = os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])
-    with subprocess.Popen(
-        [sys.executable, "-c", code],
-        env=ENVIRONMENT | {"PYTHONPATH": path},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as process:
+    env = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])}
+    interruptible = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, **PIPES, env=env, preexec_fn=interruptible) as process:
         assert process.stdout.readline() == b"here\n"
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=60) == (b"", b"clamp3d: interrupted\n")

@@ -62,10 +62,8 @@ def test_end_points_by_fig_6(half_deg: int, share: float, end: str) -> None:
         m = (side * R * mpmath.sin(a), -R * mpmath.cos(a))
         out = (side * mpmath.sin(a), -mpmath.cos(a))  # from O through M: towards P
         off = (side * mpmath.cos(a), mpmath.sin(a))  # MR: on along the circle, away from the arc
-        for turn, relation in (
-            (share * mpmath.pi / 2, ArcRelation.EXTERIOR_CONTACT),
-            ((1 + share) * mpmath.pi / 2, ArcRelation.INTERIOR_CONTACT),
-        ):
+        for quarter, relation in ((share, ArcRelation.EXTERIOR_CONTACT), (1 + share, ArcRelation.INTERIOR_CONTACT)):
+            turn = quarter * mpmath.pi / 2
             x, y = (float(m[i] + r * (mpmath.cos(turn) * out[i] + mpmath.sin(turn) * off[i])) for i in (0, 1))
             contact = arc_circle(R, math.radians(half_deg), r, x, y, tolerance=TOL)
             assert contact.relation is relation
@@ -75,14 +73,10 @@ def test_end_points_by_fig_6(half_deg: int, share: float, end: str) -> None:
 
 
 def test_tolerance_decides() -> None:
-    for gap, tolerance, relation in (
-        (1e-4, 1e-3, ArcRelation.INTERIOR_CONTACT),
-        (1e-4, 1e-5, ArcRelation.INSIDE),
-        (-1e-4, 1e-3, ArcRelation.INTERIOR_CONTACT),
-        (-1e-4, 1e-5, ArcRelation.INTERSECT),
-    ):
-        assert arc_circle(R, MINOR, 2.0, 0.0, -5.0 + gap, tolerance=tolerance).relation is relation
-        assert classify_arc_circle(gap, R, MINOR, 2.0, 0.0, -5.0, tolerance=tolerance) is relation
+    for gap, relation in ((1e-4, ArcRelation.INSIDE), (-1e-4, ArcRelation.INTERSECT)):
+        for tolerance, wanted in ((1e-3, ArcRelation.INTERIOR_CONTACT), (1e-5, relation)):
+            assert arc_circle(R, MINOR, 2.0, 0.0, -5.0 + gap, tolerance=tolerance).relation is wanted
+            assert classify_arc_circle(gap, R, MINOR, 2.0, 0.0, -5.0, tolerance=tolerance) is wanted
     contact = arc_circle(0.3, MINOR, 0.1, 0.0, -0.2, tolerance=0.0)  # 0.3 - 0.1 - 0.2 is not 0 in float64
     assert contact.relation is ArcRelation.INTERIOR_CONTACT
     assert contact.gap != 0.0 < contact.tolerance < 1e-14

@@ -1,6 +1,7 @@
 """Table 2, row by row, against polygons of another library and random positions."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -91,6 +92,13 @@ def corners(r: Rectangle) -> list[tuple[float, float]]:
     return [r.point(u * r.half_width, v * r.half_height) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
 
 
+HEIGHTS = {
+    "bolt passes through": (15.0, 60.0),
+    "bolt ends inside": (60.0, 15.0),
+    "bolt ends at a corner": (30.0, 30.0),
+}
+
+
 @settings(max_examples=150, deadline=None)
 @given(
     x=st.floats(-8.0, 8.0),
@@ -99,13 +107,11 @@ def corners(r: Rectangle) -> list[tuple[float, float]]:
     turn=st.floats(-0.6, 0.6),
     lean=st.floats(-3.0, 3.0),
     b=st.floats(3.0, 10.0),
-    ends=st.sampled_from(["bolt passes through", "bolt ends inside", "bolt ends at a corner"]),
+    ends=st.sampled_from([*HEIGHTS]),
 )
 def test_gaps_against_polygons(x: float, y: float, w: float, turn: float, lean: float, b: float, ends: str) -> None:
     """Drawn back from the wall by its own gap and 1 mm, the bolt stands 1 mm from it: depth and distance alike."""
-    hole_height, bolt_height = {"bolt passes through": (15.0, 60.0), "bolt ends inside": (60.0, 15.0)}.get(
-        ends, (30.0, 30.0)
-    )
+    hole_height, bolt_height = HEIGHTS[ends]
     bolt = Rectangle(1.0, -2.0, b, bolt_height, lean)
     hole = Rectangle(*bolt.point(x, y), w, hole_height, lean + turn)
     got = hole_bolt(hole, bolt, tolerance=TOL)
@@ -114,13 +120,9 @@ def test_gaps_against_polygons(x: float, y: float, w: float, turn: float, lean: 
     across = bolt.angle if ends == "bolt passes through" else hole.angle
     for side, gap in ((-1, got.gap_left), (1, got.gap_right)):
         back = -side * (1.0 - gap)
-        moved = Rectangle(
-            bolt.x + back * math.cos(across), bolt.y - back * math.sin(across), b, bolt_height, bolt.angle
-        )
-        corner = [hole.point(side * w, v) for v in (-hole_height, hole_height)]
-        assert ends == "bolt ends at a corner" or LineString(corner).distance(Polygon(corners(moved))) == pytest.approx(
-            1.0, abs=1e-9
-        )
+        moved = replace(bolt, x=bolt.x + back * math.cos(across), y=bolt.y - back * math.sin(across))
+        wall = LineString([hole.point(side * w, v) for v in (-hole_height, hole_height)])
+        assert ends == "bolt ends at a corner" or abs(wall.distance(Polygon(corners(moved))) - 1.0) < 1e-9
     # Witness contract: unit normal, point on the hole's wall, point + gap * normal on the bolt's outline.
     gap = min(got.gap_left, got.gap_right)
     assert math.hypot(*got.normal) == pytest.approx(1.0)

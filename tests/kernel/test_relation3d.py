@@ -58,9 +58,8 @@ def test_parallel_wire_agrees_with_the_plane_relation(half, r, x, y):
     if answer.contact.feature.name not in ("ARC", "LIP_M", "LIP_N") or answer.contact.axis_inside:
         return
     assert abs(answer.contact.distance - plane.gap) < 1e-12
-    if plane.relation is ArcRelation.INSIDE or (
-        plane.relation is ArcRelation.OUTSIDE and y >= 0.0 > -12 * math.cos(half)
-    ):
+    is_above = y >= 0.0 > -12 * math.cos(half)
+    if plane.relation is ArcRelation.INSIDE or (plane.relation is ArcRelation.OUTSIDE and is_above):
         # a circle that covers the region of the chord only partly may reach under a flat face: then it intersects
         assert answer.relation.value == plane.relation.value
 

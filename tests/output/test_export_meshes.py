@@ -19,10 +19,12 @@ from clamp3d.kernel import translation
 from clamp3d.output.export import FORMATS
 from clamp3d.output.palette import PART_COLOURS
 from tests.docs.project import ROOT, python
+from tests.kinds import mesh_shape
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 MESH_ERROR = 0.02
 FACETED = [f for f in FORMATS if f != "step"]
+COLOURS = {name: trimesh.visual.color.hex_to_rgba(colour)[:3] for name, colour in PART_COLOURS.items()}
 
 
 def read_glb(path):
@@ -34,9 +36,7 @@ def read_glb(path):
 
 @pytest.mark.parametrize("format", ["stl", "ply"])
 def test_a_format_that_would_lose_accuracy_is_refused(reference, tmp_path, format):
-    far = np.eye(4)
-    far[0, 3] = 1e6
-    scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
+    scene = clamp_scene(reference, dict.fromkeys(PARTS, translation(1e6, 0.0, 0.0)))
     with pytest.raises(InputError, match=rf"{format} holds 32-bit numbers: the pose of P1 up splint would lose 0\.03"):
         export(scene, tmp_path / format, format=format)
     assert not (tmp_path / format).exists()
@@ -73,8 +73,7 @@ def test_every_format_is_read_back_in_its_place(reference, odd_poses, odd_scene,
         if format in ("stl", "ply", "obj"):
             assert f"unit {unit}".encode() in text
         if format == "ply":
-            colour = trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]
-            assert (np.asarray(solid.visual.vertex_colors)[:, :3] == colour).all()
+            assert (np.asarray(solid.visual.vertex_colors)[:, :3] == COLOURS[name]).all()
 
 
 def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
@@ -93,7 +92,7 @@ def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
         (primitive,) = tree["meshes"][child["mesh"]]["primitives"]
         colour = tree["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorFactor"]
         srgb = [12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in colour[:3]]
-        assert [round(255 * c) for c in srgb] == list(trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3])
+        assert [round(255 * c) for c in srgb] == COLOURS[name].tolist()
 
 
 def test_obj_has_named_coloured_objects(odd_scene, tmp_path):
@@ -102,8 +101,7 @@ def test_obj_has_named_coloured_objects(odd_scene, tmp_path):
     assert set(scene.geometry) == {f"{n}_{TITLES[n].replace(' ', '_')}" for n in PARTS}
     for name in PARTS:
         solid = scene.geometry[f"{name}_{TITLES[name].replace(' ', '_')}"]
-        colour = trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]
-        np.testing.assert_allclose(solid.visual.material.main_color[:3], colour, atol=1)
+        np.testing.assert_allclose(solid.visual.material.main_color[:3], COLOURS[name], atol=1)
         assert f"newmtl {name}_" in materials.read_text()
 
 
@@ -198,12 +196,10 @@ def test_any_name_gives_readable_files(odd_scene, tmp_path):
 @pytest.mark.parametrize("name", ["world", "root", "P3"])
 def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(odd_scene, tmp_path, name):
     """A clamp called "world" became trimesh's own root: its parts lost the turn to Y up."""
-    plain, odd = (
-        trimesh.load(export(replace(odd_scene, name=n), tmp_path / f"{i}.glb", mesh_error=0.5).files[0])
-        for i, n in enumerate(("reference", name))
-    )
-    np.testing.assert_array_equal(odd.bounds, plain.bounds)
-    tree = read_glb(tmp_path / "1.glb")
+    plain = export(odd_scene, tmp_path / "plain.glb", mesh_error=0.5).files[0]
+    odd = export(replace(odd_scene, name=name), tmp_path / "odd.glb", mesh_error=0.5).files[0]
+    np.testing.assert_array_equal(trimesh.load(odd).bounds, trimesh.load(plain).bounds)
+    tree = read_glb(odd)
     (root,) = (tree["nodes"][i] for i in tree["scenes"][tree["scene"]]["nodes"])
     assert root["name"] == name
     assert [tree["nodes"][i]["name"] for i in root["children"]] == [f"{n} {TITLES[n]}" for n in PARTS]
@@ -217,9 +213,7 @@ def test_a_scene_of_drawn_solids_and_meshes(tmp_path):
     block = trimesh.creation.box((4.0, 6.0, 8.0))
     tube = shapes.cylinder(5.0, 40.0, bore=3.0)
     scene = Scene(name="pair").add("tube", tube, translation(0, 0, 7))
-    scene = scene.add("a/b", shapes.MeshShape(shapes.make_mesh(block.vertices, block.faces))).add(
-        "a-b", shapes.box((1, 1, 1))
-    )
+    scene = scene.add("a/b", mesh_shape(block)).add("a-b", shapes.box((1, 1, 1)))
     written = export(scene, tmp_path / "pair.STL", mesh_error=0.2)
     assert [p.name for p in (*written.files, written.manifest)] == ["pair.STL", "pair.STL.manifest.json"]
     listing = json.loads(written.manifest.read_text())

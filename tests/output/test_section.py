@@ -73,9 +73,7 @@ def test_figures_name_what_they_show(run):
 def test_exploded_parts_keep_clear_of_each_other():
     clamp = load_clamp(line="LJ-800")
     poses, bodies = exploded_poses(clamp), parts(clamp)
-    spans = sorted(
-        (bodies[n].bounds[:, 2] + poses[n].T()[2, 3] for n in ("P1", "P2", "P3", "P5", "P6")), key=lambda span: span[0]
-    )
+    spans = sorted(tuple(bodies[n].bounds[:, 2] + poses[n].T()[2, 3]) for n in ("P1", "P2", "P3", "P5", "P6"))
     assert all(below[1] < above[0] for below, above in itertools.pairwise(spans))
 
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from clamp3d import Scene, check, distance
+from clamp3d import distance
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
+from tests.kinds import row_of
 
 HALF = math.radians(60.0)
 BLOCK = groove_block(SweptArc(7.0, HALF, 50.0), 40.0, 20.0)  # its face is at y = -3.5
@@ -100,8 +101,8 @@ def test_depths_of_bodies_that_overlap(case):
 def test_a_wire_at_the_edge_of_contact_is_decided():
     for depth, expected in ((0.0101, "clash"), (0.0099, "contact")):
         for turn in (np.eye(4), QUARTER):
-            scene = Scene().add("a", cylinder(5, 40)).add("b", cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
-            assert check(scene).verdict("a", "b").value == expected
+            row = row_of(cylinder(5, 40), cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
+            assert row.verdict.value == expected
 
 
 # --- Open CASCADE -----------------------------------------------------------------------------------------------------

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import Scene, check, distance, load
+from clamp3d import check, distance, load
 from clamp3d.kernel import rotation, translation
-from tests.kinds import mesh_shape
+from tests.kinds import mesh_shape, row_of
 
 SKEW = rotation((1.0, 2.0, 3.0), 0.7)
 MADE = {
@@ -39,8 +39,7 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
     for reach in (9.0, 14.0, 22.0):
         T = placed(rng, reach)
         one, two = manifold(MADE[a]), manifold(MADE[b], T)
-        scene = Scene(clearance=30.0).add("a", mesh_shape(MADE[a])).add("b", mesh_shape(MADE[b]), T)
-        volume, row = (one ^ two).volume(), check(scene).pairs[0]
+        volume, row = (one ^ two).volume(), row_of(mesh_shape(MADE[a]), mesh_shape(MADE[b]), T, clearance=30.0)
         if volume > 0.1:
             assert row.verdict.value in ("clash", "contained")
             low, high = row.where.volume
@@ -56,8 +55,7 @@ def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
 @pytest.mark.parametrize("offset", [0.0, 0.005])
 def test_one_mesh_twice_is_an_overlap(name, offset):
     shape = mesh_shape(MADE[name])
-    scene = Scene().add("a", shape, SKEW).add("b", shape, translation(offset, 0, 0) @ SKEW)
-    assert check(scene).verdict("a", "b").value in ("duplicate", "contained", "clash")
+    assert row_of(shape, shape, translation(offset, 0, 0) @ SKEW).verdict.value in ("duplicate", "contained", "clash")
 
 
 def test_a_stated_chord_widens_the_bounds(tmp_path):

@@ -127,8 +127,6 @@ def test_command_prints_a_case_that_runs(family, capsys):
     assert result.exit_code == 0
     code, _, truth = result.output.rpartition("# truth: ")
     exec(code, {})
-    printed, truths = (
-        [float(word) for word in re.findall(r"-?\d+\.\d+(?:e[-+]\d+)?", text)]
-        for text in (capsys.readouterr().out, truth)
-    )
+    number = r"-?\d+\.\d+(?:e[-+]\d+)?"
+    printed, truths = ([*map(float, re.findall(number, text))] for text in (capsys.readouterr().out, truth))
     assert min(abs(one - other) for one in printed for other in truths) < 1e-6
