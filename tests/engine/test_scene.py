@@ -1,8 +1,10 @@
-"""Scenes: which pairs are asked for, allowed contacts, parts at many poses, and what is refused."""
+"""Scenes: which pairs are asked for, allowed contacts, parts at many poses, what is refused, work by size."""
 
 import itertools
 import math
 import pickle
+import sys
+from collections.abc import Callable
 from copy import copy, deepcopy
 from dataclasses import replace
 
@@ -18,6 +20,7 @@ from clamp3d.engine.model import ModelCache
 from clamp3d.engine.verdict import RESOLUTION, VERDICTS, Thresholds
 from clamp3d.geometry.pose import rotation, to_target, translation
 from clamp3d.geometry.profile import Arc, Profile, Segment
+from clamp3d.output.scene_report import check_to_text
 from clamp3d.shapes import SweptArc, make_mesh, mesh
 from tests.kinds import measured_alike
 from tests.refusals import refusals
@@ -210,3 +213,62 @@ def test_what_is_copied_or_pickled_cannot_be_written_to_either():
         assert names(again) == ["a", "b"]
         assert again.index("b") == 1
     assert len(pickle.dumps(scene)) == size
+
+
+SIZES = (100, 400)
+CUBE = shapes.box((10, 10, 10))
+PIN = shapes.cylinder(3, 12)
+
+
+def calls(run: Callable[[], object]) -> int:
+    """Functions of Python and C that a call comes to; what one of C copies is not seen."""
+    count = 0
+
+    def told(frame, event, argument):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(told)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def row_of_boxes(n: int) -> Scene:
+    """Boxes that each touch the next one, with a gap too small after every second: pairs that are allowed, and not."""
+    scene = Scene(clearance=0.5)
+    for k in range(n):
+        scene = scene.add(f"p{k}", PIN if k % 5 == 0 else CUBE, translation(10.0 * k + 0.2 * (k // 2), 0.0, 0.0))
+    return scene
+
+
+def allowed(scene: Scene) -> Scene:
+    names = [part.name for part in scene.parts]
+    for a, b in zip(names[::2], names[1::2], strict=False):
+        scene = scene.allow((a, b))
+    scene.allowance(*names[:2])
+    return scene
+
+
+STEPS: dict[str, Callable[[Scene], object]] = {
+    "add": lambda scene: row_of_boxes(len(scene.parts)),
+    "allow": allowed,
+    "check": check,
+    "verdict": lambda scene: (
+        lambda result: [result.verdict(x.name, y.name) for x, y in zip(scene.parts, scene.parts[1:], strict=False)]
+    )(check(scene)),
+    "to_dict": lambda scene: check(scene).to_dict(),
+    "text": lambda scene: check_to_text(check(scene)),
+    "poses": lambda scene: check_poses(scene, "p1", np.tile(np.eye(4), (50, 1, 1))),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_work_grows_with_the_parts(step):
+    run = STEPS[step]
+    few, many = (row_of_boxes(n) for n in SIZES)
+    run(few)  # what is made once
+    grown = calls(lambda: run(many)) / calls(lambda: run(few))
+    assert grown <= 1.3 * SIZES[1] / SIZES[0], f"{step}: {grown:.1f} times the work for 4 times the parts"

@@ -149,7 +149,8 @@ def test_bad_mesh_is_one_clear_line(vertices, faces, rule):
     assert "\n" not in message
 
 
-def test_a_cavity_is_no_body_inside_out():
+def test_corners_of_triangles_are_merged_and_cavities_kept():
+    assert len(closed_mesh(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3)).vertices) == 8
     assert len(closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8])).faces) == 24
 
 

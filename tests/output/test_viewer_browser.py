@@ -368,6 +368,7 @@ def served(opened, run):
         yield viewer, page, run
     page.wait_for_timeout(500)
     assert page.is_visible("#timeline")  # the page stays when nothing is served any more
+    page.context.close()
 
 
 def test_served_page_measures_between_the_stops(served):
@@ -436,6 +437,7 @@ def test_a_served_page_lists_verdicts_as_they_come_and_keeps_what_is_picked(open
         assert "still and deep clash: overlap 1.000000 mm" in page.inner_text(".finding.now")
         page.click(".finding >> nth=-1")  # in a motion: its curve is measured now
         wait_for(page, "(document.querySelector('#curve polygon')?.points.length || 0) >= 40")
+        page.context.close()
 
 
 def test_report_shows_its_pictures_and_links(opened, odd_page, tmp_path):
