@@ -451,14 +451,15 @@ def test_report_shows_its_pictures_and_links(opened, odd_page, tmp_path):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
 
 
-def test_meshcat_server_that_was_there_before(opened, sliding):
+def test_meshcat_server_that_was_there_before(browser, sliding):
     from meshcat.servers.zmqserver import start_zmq_server_as_subprocess
 
     server, zmq_url, web_url = start_zmq_server_as_subprocess()
     try:
         with view(sliding, mesh_error=0.1, url=zmq_url) as viewer:
             assert viewer.url == web_url
-        page = opened(web_url)  # meshcat's own page, after we have left
+        page = browser.new_page()
+        page.goto(web_url)  # meshcat's own page, after we have left
         wait_for(page, "viewer.animator.duration > 0")
         for seconds, x in (("0", 30.0), ("viewer.animator.duration", 5.0)):
             page.evaluate(f"viewer.animator.pause(); viewer.animator.seek({seconds})")
@@ -466,7 +467,7 @@ def test_meshcat_server_that_was_there_before(opened, sliding):
             np.testing.assert_allclose(poses["still"], np.eye(4), atol=2e-4)
             np.testing.assert_allclose(poses["slider"], translation(x, 0, 0), atol=2e-4)
         assert visible(page, "caption")  # the mesh error, in the picture itself
-        page.context.close()
+        page.close()
     finally:
         server.kill()
         server.communicate()
