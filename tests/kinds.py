@@ -26,6 +26,8 @@ def box_mesh(size, error=None):
     return Surface(np.array(cuboid.vertices), np.array(cuboid.faces), None if error is None else np.full(12, error))
 
 
+SHANK = Extrusion(Profile.circle(4.0), "Z", -20.0, 10.0)
+HEAD = Extrusion(Profile.of((-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)), "Z", 10.0, 15.0)
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")
 DRAWN = [
     BLOCK,
@@ -42,13 +44,7 @@ DRAWN = [
     shapes.cylinder(8.0, 12.0, bore=4.0, name="tube"),
     shapes.box((30.0, 12.0, 18.0)),
     shapes.box((30.0, 25.0, 6.0), holes=[shapes.Hole(4.0, (3.0, 2.0))], name="plate"),
-    shapes.Solid(
-        "bolt",
-        (
-            Extrusion(Profile.circle(4.0), "Z", -20.0, 10.0),
-            Extrusion(Profile.of((-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)), "Z", 10.0, 15.0),
-        ),
-    ),
+    shapes.Solid("bolt", (SHANK, HEAD)),
 ]
 
 

@@ -156,8 +156,5 @@ def test_exit_code_is_that_of_the_worst_certain_verdict(z, broken_pair, code, tm
 def test_an_uncertain_verdict_names_the_thresholds_between_its_bounds():
     limits = Thresholds(contact=0.01, clearance=0.5)
     assert limits.between(Distance(0.2, 0.9)) == ["a gap of 0.5 mm (clearance)"]
-    assert limits.between(Distance(-0.03, 0.02)) == [
-        "a gap of 0.01 mm (contact)",
-        "an overlap of 0.01 mm (contact)",
-    ]
+    assert limits.between(Distance(-0.03, 0.02)) == ["a gap of 0.01 mm (contact)", "an overlap of 0.01 mm (contact)"]
     assert limits.between(Distance(-0.03, 0.0), 0.02) == ["an overlap of 0.02 mm (allowed)"]

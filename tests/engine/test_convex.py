@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from clamp3d import Scene, Verdict, check, distance, shapes
@@ -16,7 +17,6 @@ from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
 from clamp3d.testing import directions
-from tests.hulls import apart
 from tests.kinds import TURNED, manifold_shape
 
 HERE = np.eye(4)
@@ -31,6 +31,17 @@ def corners(piece, T, sides=90, scale=1.0):
     rim = scale * piece.radius * np.column_stack([np.cos(turn), np.sin(turn)])
     ends = [np.column_stack([rim, np.full(sides, z * piece.length)]) for z in (-0.5, 0.5)]
     return to_target(T @ piece.T, np.vstack(ends))
+
+
+def apart(one, other):
+    """Distance of the convex hulls of two sets of points (k, 3) and (m, 3).
+
+    By least squares over weights that are not negative (Lawson and Hanson, *Solving Least Squares Problems*, 1974,
+    chapter 23).
+    """
+    ends = (one[:, None] - other[None]).reshape(-1, 3).T
+    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
+    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def signed(one, other):

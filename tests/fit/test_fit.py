@@ -55,16 +55,9 @@ def test_exact_tessellation_has_no_facet_bias(chord_error):
 
 
 def test_every_round_surface_of_the_reference_clamp_is_found_and_no_other():
-    fits = {name: fitted(meshing.mesh(part, 0.05)) for name, part in parts(load_clamp()).items()}
-    assert {name: (len(f.grooves), len(f.cylinders), len(f.holes)) for name, f in fits.items()} == {
-        "P1": (2, 0, 1),
-        "P2": (2, 1, 0),
-        "P3": (1, 0, 1),
-        "P4": (0, 1, 0),
-        "P5": (0, 0, 1),
-        "P6": (0, 1, 0),
-        "P7": (0, 1, 0),
-    }
+    fits = [fitted(meshing.mesh(part, 0.05)) for part in parts(load_clamp()).values()]
+    counts = [(len(f.grooves), len(f.cylinders), len(f.holes)) for f in fits]
+    assert counts == [(2, 0, 1), (2, 1, 0), (1, 0, 1), (0, 1, 0), (0, 0, 1), (0, 1, 0), (0, 1, 0)]  # P1 to P7
 
 
 def test_mirrored_part_keeps_its_grooves():
@@ -132,7 +125,7 @@ def test_cylinder_wire_and_blind_hole():
         trimesh.creation.icosphere(subdivisions=3, radius=10.0),
         trimesh.creation.cone(10.0, 20.0, sections=48),
         trimesh.creation.cylinder(10.0, 20.0, sections=6),  # a hexagon is a nut
-        trimesh.creation.torus(200.0, 50.0, major_sections=16, minor_sections=12),
+        trimesh.creation.torus(200.0, 50.0, major_sections=24, minor_sections=16),
     ],
     ids=["box", "sphere", "cone", "hexagon", "torus"],
 )
