@@ -1,11 +1,11 @@
-"""Solids and STEP assemblies made by Open CASCADE alone: of clamp3d only the short way to its classes is used."""
+"""Solids and STEP assemblies made by Open CASCADE alone: of clamp3d only the short ways to classes and shapes."""
 
 import importlib
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from clamp3d.files.open_cascade import occ
+from clamp3d.files.open_cascade import explore, occ
 
 
 def array_of(kind, values):
@@ -81,11 +81,7 @@ def cut(shape, *tools):
 
 
 def solids_of(shape):
-    explorer, solids = occ.TopExp_Explorer(shape, occ.TopAbs_ShapeEnum.TopAbs_SOLID), []
-    while explorer.More():
-        solids.append(explorer.Current())
-        explorer.Next()
-    return solids
+    return [*explore(shape, "SOLID")]
 
 
 def first_solid(shape):

@@ -15,6 +15,8 @@ from tests.cli.boxes import boxes
 COMMAND = [sys.executable, "-m", "clamp3d"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+INTERRUPTIBLE = PIPES | {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+"""A background job without a terminal hands an ignored Ctrl-C down to its children."""
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
 
 
@@ -44,30 +46,30 @@ def test_what_a_library_logs_of_a_damaged_robot_is_not_told(tmp_path):
     assert (done.returncode, done.stderr.count(b"\n")) == (2, 1), done.stderr
 
 
-class TestText:
-    @pytest.mark.parametrize(
-        "env", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
-    )
-    def test_a_terminal_without_the_letters(self, scene, env):
-        done = clamp3d("check", scene, env=env)
-        assert (done.returncode, done.stderr) == (0, b"")
-        assert b"1 clear" in done.stdout
+@pytest.mark.parametrize(
+    "env", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+)
+def test_a_terminal_without_the_letters(scene, env):
+    done = clamp3d("check", scene, env=env)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"1 clear" in done.stdout
 
-    @posix
-    def test_a_file_name_that_is_not_utf8(self, scene, tmp_path):
-        odd = os.fsencode(tmp_path) + b"/n\xff.toml"
-        try:
-            os.rename(scene, odd)
-        except OSError:
-            pytest.skip("this file system wants UTF-8")
-        done = clamp3d("check", odd, "--json", "-")
-        assert (done.returncode, b"inside clamp3d" in done.stderr) == (0, False)
-        assert b"udcff" in done.stdout
-        done = clamp3d("export", odd, "-o", os.fsencode(tmp_path) + b"/o\xff.glb")
-        assert done.returncode == 0, done.stderr
-        (manifest,) = tmp_path.glob("*.manifest.json")
-        (name,) = json.loads(manifest.read_text())["files"]
-        assert name == "o\udcff.glb"
+
+@posix
+def test_a_file_name_that_is_not_utf8(scene, tmp_path):
+    odd = os.fsencode(tmp_path) + b"/n\xff.toml"
+    try:
+        os.rename(scene, odd)
+    except OSError:
+        pytest.skip("this file system wants UTF-8")
+    done = clamp3d("check", odd, "--json", "-")
+    assert (done.returncode, b"inside clamp3d" in done.stderr) == (0, False)
+    assert b"udcff" in done.stdout
+    done = clamp3d("export", odd, "-o", os.fsencode(tmp_path) + b"/o\xff.glb")
+    assert done.returncode == 0, done.stderr
+    (manifest,) = tmp_path.glob("*.manifest.json")
+    (name,) = json.loads(manifest.read_text())["files"]
+    assert name == "o\udcff.glb"
 
 
 @pytest.mark.parametrize(("value", "command"), [("now", "run"), ("1.5", "conductors"), ("9" * 20, "conductors")])
@@ -82,28 +84,28 @@ def test_an_empty_date_is_none(main, monkeypatch):
     assert main("conductors")[0] == 0
 
 
-class TestStreams:
-    @pytest.mark.parametrize("arguments", [(), ("--json", "-")])
-    def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(self, arguments, tmp_path):
-        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
-        with subprocess.Popen([*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], **PIPES) as process:
-            process.stdout.close()
-            assert process.stderr.read() == b"" or arguments
-            assert process.wait(120) == 1
+@pytest.mark.parametrize("arguments", [(), ("--json", "-")])
+def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(arguments, tmp_path):
+    boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
+    with subprocess.Popen([*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], **PIPES) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b"" or arguments
+        assert process.wait(120) == 1
 
-    @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
-    @pytest.mark.parametrize(
-        ("arguments", "stream", "count"),
-        [(["--help"], "stdout", 1), (["check", "a.toml"], "stdout", 1), (["check", "none.toml"], "stderr", 0)],
-    )
-    def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, stream, count, tmp_path):
-        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
-        with open("/dev/full", "w") as full:
-            streams = PIPES | {stream: full}
-            done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
-        said = done.stderr or b""
-        assert done.returncode == 2
-        assert said.count(b"error") == said.count(b"No space left on device") == count
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+@pytest.mark.parametrize(
+    ("arguments", "stream", "count"),
+    [(["--help"], "stdout", 1), (["check", "a.toml"], "stdout", 1), (["check", "none.toml"], "stderr", 0)],
+)
+def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(arguments, stream, count, tmp_path):
+    boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
+    with open("/dev/full", "w") as full:
+        streams = PIPES | {stream: full}
+        done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
+    said = done.stderr or b""
+    assert done.returncode == 2
+    assert said.count(b"error") == said.count(b"No space left on device") == count
 
 
 @posix
@@ -149,9 +151,7 @@ def test_an_interrupt_ends_the_program_also_while_a_library_that_ignores_it_is_i
     )
     code = "from clamp3d.cli.terminal import end_on_signals; end_on_signals(); import stubborn; print('went on')"
     env = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])}
-    interruptible = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
-    command = [sys.executable, "-c", code]
-    with subprocess.Popen(command, **PIPES, env=env, preexec_fn=interruptible) as process:
+    with subprocess.Popen([sys.executable, "-c", code], **INTERRUPTIBLE, env=env) as process:
         assert process.stdout.readline() == b"here\n"
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=60) == (b"", b"clamp3d: interrupted\n")

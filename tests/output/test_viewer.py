@@ -8,7 +8,6 @@ import re
 import signal
 import socket
 import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -32,6 +31,7 @@ from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer import Viewer
 from clamp3d.output.viewer_story import ClampStory
 from tests.cli.boxes import boxes
+from tests.cli.test_faults import COMMAND, INTERRUPTIBLE
 
 
 def commands_of(viewer):
@@ -326,14 +326,7 @@ def test_without_a_meshcat_server_there_is_an_error(monkeypatch):
 
 def test_view_serves_until_interrupted_and_leaves_nothing(tmp_path):
     scene = boxes(tmp_path / "boxes.toml", {"a": 0, "b": 20})
-    process = subprocess.Popen(
-        [sys.executable, "-m", "clamp3d", "view", scene],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A background job without a terminal hands an ignored Ctrl-C down to its children.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
+    process = subprocess.Popen([*COMMAND, "view", scene], **INTERRUPTIBLE, text=True)
     try:
         url = process.stdout.readline().strip()
         assert "meshcat-pane" in read(url)[1]
