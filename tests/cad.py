@@ -13,7 +13,7 @@ def array_of(kind, values):
     values = np.asarray(values, dtype=object)
     try:
         made = getattr(importlib.import_module("OCP.collections"), f"Array{values.ndim}_{kind}")
-    except ModuleNotFoundError:  # before OCP 7.9.3
+    except ModuleNotFoundError:  # of an older OCP
         old = {"gp_Pnt": "TColgp_Array%dOfPnt", "double": "TColStd_Array%dOfReal", "int": "TColStd_Array%dOfInteger"}
         made = getattr(occ, old[kind] % values.ndim)
     array = made(*(end for count in values.shape for end in (1, count)))

@@ -11,7 +11,7 @@ from clamp3d.bench.stress.assemblies.family import ASSEMBLIES, EXACT
 from clamp3d.bench.stress.assemblies.minima import minima
 from clamp3d.bench.stress.run import run_family
 
-CLAMPS = 1  # the campaign of docs/methods.md has thousands
+CLAMPS = 1
 
 
 @pytest.mark.parametrize("family", ASSEMBLIES)
