@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from hypothesis import strategies as st
 
+from clamp3d import Scene
 from clamp3d.engine.check import check
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry import shapes
@@ -25,6 +26,8 @@ def box_mesh(size, error=None):
     return Surface(np.array(cuboid.vertices), np.array(cuboid.faces), None if error is None else np.full(12, error))
 
 
+SHANK = Extrusion(Profile.circle(4.0), "Z", -20.0, 10.0)
+HEAD = Extrusion(Profile.of((-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)), "Z", 10.0, 15.0)
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0, name="block")
 DRAWN = [
     BLOCK,
@@ -41,19 +44,19 @@ DRAWN = [
     shapes.cylinder(8.0, 12.0, bore=4.0, name="tube"),
     shapes.box((30.0, 12.0, 18.0)),
     shapes.box((30.0, 25.0, 6.0), holes=[shapes.Hole(4.0, (3.0, 2.0))], name="plate"),
-    shapes.Solid(
-        "bolt",
-        (
-            Extrusion(Profile.circle(4.0), "Z", -20.0, 10.0),
-            Extrusion(Profile.of((-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)), "Z", 10.0, 15.0),
-        ),
-    ),
+    shapes.Solid("bolt", (SHANK, HEAD)),
 ]
 
 
 def mesh_shape(made, fit="off", **more):
     """A mesh of trimesh as a shape."""
     return shapes.MeshShape(make_mesh(made.vertices, made.faces), fit, **more)
+
+
+def manifold_shape(made, fit="off", **more):
+    """A body of manifold3d as a shape."""
+    mesh = made.to_mesh64()
+    return shapes.MeshShape(make_mesh(np.array(mesh.vert_properties)[:, :3], mesh.tri_verts), fit, **more)
 
 
 def faceted_shape(solid, error, fit="off"):
@@ -70,6 +73,12 @@ def poses(reach):
     angle = st.one_of(st.floats(0.0, 2.0 * math.pi), st.sampled_from([0.0, 1e-3, math.pi / 2, math.pi]))
     axis = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
     return st.builds(pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))
+
+
+def row_of(a, b, T, *, distances=False, **scene):
+    """The one row of the check of two parts."""
+    (row,) = check(Scene(**scene).add("a", a).add("b", b, T), distances=distances).pairs
+    return row
 
 
 def measured_alike(scene, result):

@@ -10,17 +10,8 @@ from clamp3d import Cylinder, Distance, Motion, distance, first_contact, load_cl
 from clamp3d.clamp.parts import parts
 from clamp3d.geometry.meshing import chord_error
 from clamp3d.geometry.pose import inverse
-from clamp3d.kernel import rotation, translation
-from clamp3d.shapes import SweptArc
-from clamp3d.testing import (
-    Body,
-    assert_distance,
-    assert_lower_on_way,
-    assert_motion,
-    body,
-    common,
-    separation,
-)
+from clamp3d.kernel import SweptArc, rotation, translation
+from clamp3d.testing import Body, assert_distance, assert_lower_on_way, assert_motion, body, common, separation
 from tests.kinds import BLOCK, DRAWN, faceted_shape
 
 BALL = Body(lambda x: np.linalg.norm(x, axis=1) - 2.0, np.array([[-2.0] * 3, [2.0] * 3]))
@@ -43,17 +34,10 @@ def test_fields_agree_with_a_mesh_of_the_same_shape(shape):
 
 def test_fields_are_nowhere_steeper_than_one():
     rng = np.random.default_rng(1)
-    for shape in (
-        *DRAWN,
-        Cylinder(3.0, 8.0),
-        SweptArc(7.0, 2.0, 9.0),
-        SweptArc(7.0, 0.5, 9.0),
-        *parts(load_clamp()).values(),
-    ):
-        x, step = (
-            rng.uniform(-30.0, 30.0, (4000, 3)),
-            rng.normal(size=(4000, 3)) * 10.0 ** rng.uniform(-6, 1, (4000, 1)),
-        )
+    primitives = Cylinder(3.0, 8.0), SweptArc(7.0, 2.0, 9.0), SweptArc(7.0, 0.5, 9.0)
+    for shape in (*DRAWN, *primitives, *parts(load_clamp()).values()):
+        x = rng.uniform(-30.0, 30.0, (4000, 3))
+        step = rng.normal(size=x.shape) * 10.0 ** rng.uniform(-6, 1, (4000, 1))
         field = body(shape).field
         assert (np.abs(field(x + step) - field(x)) <= np.linalg.norm(step, axis=1) * (1.0 + 1e-9) + 1e-12).all()
 

@@ -1,20 +1,26 @@
-"""The contact models against the exact groove and each other; what goes with which method."""
+"""The contact models against the exact groove and each other; wedges fill the outline once, and all of it."""
 
 import math
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from clamp3d import Cylinder, InputError, assemble, baselines, load_clamp
-from clamp3d.baselines import Cas, Chords, Hulls, Meshes, Wedges
+from clamp3d import Cylinder, assemble, load_clamp
+from clamp3d.baselines import METHODS, Cas, Chords, Hulls, Meshes, Wedges, contact_model
 from clamp3d.baselines.decomposition import DecompositionParameters
+from clamp3d.baselines.fcl_shapes import convex
+from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import block_pair, grooved_block
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.parts import parts
-from clamp3d.geometry.pose import inverse
-from clamp3d.kernel import rotation, translation
+from clamp3d.geometry.pose import inverse, rotation, translation
+from clamp3d.geometry.profile import Arc
 from clamp3d.shapes import SweptArc, mesh
+from tests.refusals import refusals
 
 GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 PAIR = block_pair(GROOVE, Cylinder(10.5, 200.0))
@@ -125,17 +131,6 @@ def test_wedges_of_the_reference_clamp_are_the_chords_of_its_section(key, unit_d
     assert ((wedges < 0.0) == (expected < 0.0)).all()
 
 
-def test_unknown_part_and_bad_pose_are_refused():
-    model = Wedges({"P2": BLOCK}, 0.2)
-    with pytest.raises(InputError, match="unknown part 'P1'; available: P2"):
-        model.distances(PAIR, np.eye(4)[None])
-    for checked in (Wedges({"P1": BLOCK}, 0.2), Meshes({"P1": BLOCK}, MESH_ERROR)):
-        with pytest.raises(InputError, match="must be finite"):
-            checked.pieces(PAIR, np.full((4, 4), np.nan))
-        with pytest.raises(InputError, match="must be finite"):
-            checked.distances(PAIR, np.full((1, 4, 4), np.nan))
-
-
 def test_wedges_in_3d_assemble_the_clamp_to_the_published_distance():
     clamp = load_clamp()
     result = assemble(clamp, Wedges(parts(clamp), math.radians(40.0)))
@@ -152,20 +147,9 @@ def test_a_coaxial_wire_loses_the_chord_error(unit_deg, m):
     assert m != 8 or free == pytest.approx(6.865, abs=1e-3)
 
 
-def test_chords_of_tilted_wires_are_refused():
-    with pytest.raises(InputError, match="parallel axes only"):
-        Chords(0.1).pieces(PAIR, rotation([1.0, 0.0, 0.0], 1e-6))
-
-
-@pytest.mark.parametrize("angle", [0.0, -1.0, math.pi, math.nan])
-def test_unit_angle_must_be_an_angle(angle):
-    with pytest.raises(InputError, match=r"unit angle must be (between 0 and 180 deg|a finite number)"):
-        Chords(angle)
-
-
-@pytest.mark.parametrize("name", baselines.METHODS)
+@pytest.mark.parametrize("name", METHODS)
 def test_every_method_is_made_and_makes_nothing_before_it_is_asked(name):
-    model = baselines.contact_model(name, {"P1": BLOCK}, progress=False)
+    model = contact_model(name, {"P1": BLOCK}, progress=False)
     assert model.name == name
     assert model.meshes_built == 0
     if name != "hulls":  # CoACD takes seconds
@@ -173,15 +157,66 @@ def test_every_method_is_made_and_makes_nothing_before_it_is_asked(name):
         assert model.meshes_built == (1 if name == "mesh" else 0)
 
 
-@pytest.mark.parametrize(
-    ("method", "parts", "settings", "message"),
-    [
-        ("mesh", {"P1": BLOCK}, {"threshold": 1.0}, "threshold goes with method hulls, got method 'mesh'"),
-        ("fog", None, {}, "unknown method 'fog'; available: cas, chords, wedges, hulls, mesh"),
-        ("wedges", None, {}, "method 'wedges' needs the parts"),
-        ("mesh", [BLOCK], {}, "parts must be"),
-    ],
+NAN, MADE = np.full((4, 4), np.nan), (Wedges({"P1": BLOCK}, 0.2), Meshes({"P1": BLOCK}, MESH_ERROR))
+test_what_does_not_go_together_is_refused = refusals(
+    (lambda: contact_model("mesh", {"P1": BLOCK}, threshold=1.0), "threshold goes with method hulls, got method 'mesh"),
+    (lambda: contact_model("fog", None), "unknown method 'fog'; available: cas, chords, wedges, hulls, mesh"),
+    (lambda: contact_model("wedges", None), "method 'wedges' needs the parts"),
+    (lambda: contact_model("mesh", [BLOCK]), "parts must be"),
+    (lambda: Wedges({"P2": BLOCK}, 0.2).distances(PAIR, np.eye(4)[None]), "unknown part 'P1'; available: P2"),
+    *((lambda model=model: model.pieces(PAIR, NAN), "must be finite") for model in MADE),
+    *((lambda model=model: model.distances(PAIR, NAN[None]), "must be finite") for model in MADE),
+    (lambda: Chords(0.1).pieces(PAIR, rotation([1.0, 0.0, 0.0], 1e-6)), "parallel axes only"),
+    *((lambda angle=angle: Chords(angle), "unit angle must be between") for angle in (0.0, -1.0, 4.0, math.nan)),
 )
-def test_what_does_not_go_together_is_said_in_one_line(method, parts, settings, message):
-    with pytest.raises(InputError, match=message):
-        baselines.contact_model(method, parts, **settings)
+
+
+def assert_filled_once(wedges, outline):
+    """The pieces are convex, do not overlap, and together are the outline."""
+    polygons = [shapely.Polygon(wedge.polygon) for wedge in wedges]
+    assert all(p.convex_hull.area == pytest.approx(p.area, rel=1e-9) for p in polygons)
+    assert sum(p.area for p in polygons) == pytest.approx(outline.area, rel=1e-12, abs=1e-5)
+    # On a grid: without one a union loses a polygon where corners differ by rounding.
+    assert shapely.union_all(polygons, grid_size=1e-9).symmetric_difference(outline).area < 1e-5
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    radius=st.floats(1.0, 60.0), half_deg=st.floats(2.0, 150.0), unit_deg=st.floats(1.0, 170.0),
+    spare=st.floats(0.1, 50.0),
+)  # fmt: skip
+def test_block_is_filled_once(radius, half_deg, unit_deg, spare):
+    half, unit = math.radians(half_deg), math.radians(unit_deg)
+    face = radius * math.cos(half)
+    width = 2.0 * (radius * math.sin(min(half, math.pi / 2)) + spare)
+    depth = radius - face + spare
+    wedges = part_wedges(grooved_block(SweptArc(radius, half, 10.0), width=width, depth=depth), unit)
+    m = math.ceil(2.0 * half / unit - 1e-9)
+    assert len(wedges) == m + (2 if half < math.pi / 2 else 0)
+    angles = np.linspace(-half, half, m + 1)
+    hollow = shapely.Polygon(radius * np.column_stack([np.sin(angles), np.cos(angles)])) if m > 1 else shapely.Polygon()
+    block = shapely.box(-width / 2, face, width / 2, face + depth)
+    assert_filled_once(wedges, block.difference(hollow))
+
+
+@pytest.mark.parametrize("name", ["P1", "P2", "P3"])
+@pytest.mark.parametrize("unit_deg", [1.0, 40.0])
+def test_clamp_parts_are_filled_once(name, unit_deg):
+    part = parts(load_clamp())[name]
+    unit, corners = math.radians(unit_deg), []
+    for edge in part.bodies[0].profile.edges:
+        corners.append(edge.start)
+        if isinstance(edge, Arc):
+            n = edge.chord_count(0.01) if edge.sweep > 0.0 else max(1, math.ceil(-edge.sweep / unit - 1e-9))
+            turns = edge.start_angle + edge.sweep * np.arange(1, n) / n
+            corners += [*(edge.centre + edge.radius * np.column_stack([np.cos(turns), np.sin(turns)]))]
+    wedges = part_wedges(part, unit)
+    assert_filled_once(wedges, shapely.Polygon(corners))
+    for wedge in wedges:
+        assert len(convex(prism(wedge.polygon, -30.0, 30.0)).solid.vertices) == 2 * len(wedge.polygon)
+
+
+test_parts_without_wedges_are_refused = refusals(
+    (lambda: part_wedges(parts(load_clamp())["P6"], 0.1), "part P6 must have a groove"),
+    (lambda: part_wedges(parts(load_clamp())["P4"], 0.1), "part P4 must be one body"),
+)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clamp3d import InputError
 from clamp3d.baselines.decomposition import DecompositionParameters, cache_dir, decompose
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.errors import SolverError
 from clamp3d.shapes import SweptArc, mesh
+from tests.refusals import refusals
 
 BLOCK = grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, depth=30.0)
 COARSE = DecompositionParameters(threshold=0.05, real_metric=False)
@@ -71,20 +71,10 @@ def test_a_process_that_fails_is_said(monkeypatch):
     assert not cache_dir().exists()
 
 
-def test_a_bad_mesh_is_refused():
-    for vertices, faces, rule in ((np.full_like(V, np.nan), F, "finite"), (V, F[1:], "watertight")):
-        with pytest.raises(InputError, match=rule):
-            decompose(vertices, faces, COARSE)
-
-
-@pytest.mark.parametrize(
-    ("changes", "rule"),
-    [
-        ({"threshold": 0.0}, "threshold must be > 0, got 0"),
-        ({"threshold": math.nan}, "threshold must be > 0"),
-        ({"threshold": 2.0, "real_metric": False}, "threshold must be <= 1 without real_metric"),
-    ],
+test_bad_meshes_and_parameters_are_refused = refusals(
+    (lambda: decompose(np.full_like(V, np.nan), F, COARSE), "finite"),
+    (lambda: decompose(V, F[1:], COARSE), "watertight"),
+    (lambda: DecompositionParameters(threshold=0.0), "threshold must be > 0, got 0"),
+    (lambda: DecompositionParameters(threshold=math.nan), "threshold must be > 0"),
+    (lambda: DecompositionParameters(threshold=2.0, real_metric=False), "threshold must be <= 1 without real_metric"),
 )
-def test_parameters_are_checked(changes, rule):
-    with pytest.raises(InputError, match=rule):
-        DecompositionParameters(**changes)

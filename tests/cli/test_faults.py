@@ -14,6 +14,9 @@ from tests.cli.boxes import boxes
 
 COMMAND = [sys.executable, "-m", "clamp3d"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+INTERRUPTIBLE = PIPES | {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+"""A background job without a terminal hands an ignored Ctrl-C down to its children."""
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
 
 
@@ -43,30 +46,30 @@ def test_what_a_library_logs_of_a_damaged_robot_is_not_told(tmp_path):
     assert (done.returncode, done.stderr.count(b"\n")) == (2, 1), done.stderr
 
 
-class TestText:
-    @pytest.mark.parametrize(
-        "env", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
-    )
-    def test_a_terminal_without_the_letters(self, scene, env):
-        done = clamp3d("check", scene, env=env)
-        assert (done.returncode, done.stderr) == (0, b"")
-        assert b"1 clear" in done.stdout
+@pytest.mark.parametrize(
+    "env", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+)
+def test_a_terminal_without_the_letters(scene, env):
+    done = clamp3d("check", scene, env=env)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"1 clear" in done.stdout
 
-    @posix
-    def test_a_file_name_that_is_not_utf8(self, scene, tmp_path):
-        odd = os.fsencode(tmp_path) + b"/n\xff.toml"
-        try:
-            os.rename(scene, odd)
-        except OSError:
-            pytest.skip("this file system wants UTF-8")
-        done = clamp3d("check", odd, "--json", "-")
-        assert (done.returncode, b"inside clamp3d" in done.stderr) == (0, False)
-        assert b"udcff" in done.stdout
-        done = clamp3d("export", odd, "-o", os.fsencode(tmp_path) + b"/o\xff.glb")
-        assert done.returncode == 0, done.stderr
-        (manifest,) = tmp_path.glob("*.manifest.json")
-        (name,) = json.loads(manifest.read_text())["files"]
-        assert name == "o\udcff.glb"
+
+@posix
+def test_a_file_name_that_is_not_utf8(scene, tmp_path):
+    odd = os.fsencode(tmp_path) + b"/n\xff.toml"
+    try:
+        os.rename(scene, odd)
+    except OSError:
+        pytest.skip("this file system wants UTF-8")
+    done = clamp3d("check", odd, "--json", "-")
+    assert (done.returncode, b"inside clamp3d" in done.stderr) == (0, False)
+    assert b"udcff" in done.stdout
+    done = clamp3d("export", odd, "-o", os.fsencode(tmp_path) + b"/o\xff.glb")
+    assert done.returncode == 0, done.stderr
+    (manifest,) = tmp_path.glob("*.manifest.json")
+    (name,) = json.loads(manifest.read_text())["files"]
+    assert name == "o\udcff.glb"
 
 
 @pytest.mark.parametrize(("value", "command"), [("now", "run"), ("1.5", "conductors"), ("9" * 20, "conductors")])
@@ -81,51 +84,46 @@ def test_an_empty_date_is_none(main, monkeypatch):
     assert main("conductors")[0] == 0
 
 
-class TestStreams:
-    @pytest.mark.parametrize("arguments", [(), ("--json", "-")])
-    def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(self, arguments, tmp_path):
-        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
-        with subprocess.Popen(
-            [*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        ) as process:
-            process.stdout.close()
-            assert process.stderr.read() == b"" or arguments
-            assert process.wait(120) == 1
+@pytest.mark.parametrize("arguments", [(), ("--json", "-")])
+def test_a_reader_that_goes_away_leaves_the_verdict_its_exit_code(arguments, tmp_path):
+    boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
+    with subprocess.Popen([*COMMAND, "check", "-q", tmp_path / "a.toml", *arguments], **PIPES) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b"" or arguments
+        assert process.wait(120) == 1
 
-    @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
-    @pytest.mark.parametrize(
-        ("arguments", "stream", "count"),
-        [(["--help"], "stdout", 1), (["check", "a.toml"], "stdout", 1), (["check", "none.toml"], "stderr", 0)],
-    )
-    def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(self, arguments, stream, count, tmp_path):
-        boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
-        with open("/dev/full", "w") as full:
-            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
-            done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
-        said = done.stderr or b""
-        assert done.returncode == 2
-        assert said.count(b"error") == said.count(b"No space left on device") == count
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+@pytest.mark.parametrize(
+    ("arguments", "stream", "count"),
+    [(["--help"], "stdout", 1), (["check", "a.toml"], "stdout", 1), (["check", "none.toml"], "stderr", 0)],
+)
+def test_a_full_disk_is_one_line_and_bad_input_whatever_the_verdict(arguments, stream, count, tmp_path):
+    boxes(tmp_path / "a.toml", {"a": 0, "b": 9})
+    with open("/dev/full", "w") as full:
+        streams = PIPES | {stream: full}
+        done = subprocess.run([*COMMAND, *arguments], **streams, check=False, cwd=tmp_path, env=ENVIRONMENT)
+    said = done.stderr or b""
+    assert done.returncode == 2
+    assert said.count(b"error") == said.count(b"No space left on device") == count
 
 
 @posix
-class TestEnd:
-    def test_when_asked_to_end_nothing_is_left(self, tmp_path):
-        """The decomposition of a splint takes tens of seconds in a process of its own."""
-        temporary = tmp_path / "tmp"
-        temporary.mkdir()
-        env = ENVIRONMENT | {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
-        with subprocess.Popen(
-            [*COMMAND, "run", "-q", "--method", "hulls"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env
-        ) as process:
-            until(lambda: _children(process.pid))
-            workers = _children(process.pid)
-            process.send_signal(signal.SIGTERM)
-            out, err = process.communicate(timeout=60)
-        lines = err.decode().splitlines()
-        said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
-        assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
-        assert list(temporary.iterdir()) == []
-        until(lambda: not any(alive(worker) for worker in workers))
+def test_when_asked_to_end_nothing_is_left(tmp_path):
+    """The decomposition of a splint takes tens of seconds in a process of its own."""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    env = ENVIRONMENT | {"TMPDIR": str(temporary), "CLAMP3D_CACHE": str(tmp_path / "cache")}
+    with subprocess.Popen([*COMMAND, "run", "-q", "--method", "hulls"], **PIPES, env=env) as process:
+        until(lambda: _children(process.pid))
+        workers = _children(process.pid)
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+    lines = err.decode().splitlines()
+    said = [line for line in lines if line and not line.startswith("clamp3d: compiling")]  # a new cache
+    assert (process.returncode, out, said) == (128 + signal.SIGTERM, b"", [])
+    assert list(temporary.iterdir()) == []
+    until(lambda: not any(alive(worker) for worker in workers))
 
 
 def until(condition):
@@ -152,14 +150,8 @@ def test_an_interrupt_ends_the_program_also_while_a_library_that_ignores_it_is_i
         "import time\nprint('here', flush=True)\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    pass\n"
     )
     code = "from clamp3d.cli.terminal import end_on_signals; end_on_signals(); import stubborn; print('went on')"
-    path = os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])
-    with subprocess.Popen(
-        [sys.executable, "-c", code],
-        env=ENVIRONMENT | {"PYTHONPATH": path},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as process:
+    env = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])}
+    with subprocess.Popen([sys.executable, "-c", code], **INTERRUPTIBLE, env=env) as process:
         assert process.stdout.readline() == b"here\n"
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=60) == (b"", b"clamp3d: interrupted\n")

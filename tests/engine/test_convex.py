@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from clamp3d import Scene, Verdict, check, distance, shapes
@@ -15,10 +16,8 @@ from clamp3d.engine.convex import Rod, convex_distance
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
-from clamp3d.shapes import make_mesh
 from clamp3d.testing import directions
-from tests.hulls import apart
-from tests.kinds import TURNED
+from tests.kinds import TURNED, manifold_shape
 
 HERE = np.eye(4)
 CUBE = hull(np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]))
@@ -32,6 +31,17 @@ def corners(piece, T, sides=90, scale=1.0):
     rim = scale * piece.radius * np.column_stack([np.cos(turn), np.sin(turn)])
     ends = [np.column_stack([rim, np.full(sides, z * piece.length)]) for z in (-0.5, 0.5)]
     return to_target(T @ piece.T, np.vstack(ends))
+
+
+def apart(one, other):
+    """Distance of the convex hulls of two sets of points (k, 3) and (m, 3).
+
+    By least squares over weights that are not negative (Lawson and Hanson, *Solving Least Squares Problems*, 1974,
+    chapter 23).
+    """
+    ends = (one[:, None] - other[None]).reshape(-1, 3).T
+    weights, _ = nnls(np.vstack([ends, np.ones(ends.shape[1])]), np.array([0.0, 0.0, 0.0, 1.0]))
+    return float(np.linalg.norm(ends @ weights) / weights.sum())
 
 
 def signed(one, other):
@@ -106,10 +116,8 @@ def test_points_of_an_overlap_lie_on_both_surfaces_and_part_last():
     rng = np.random.default_rng(3)
     deep = 0
     for k in range(60):
-        a, b = (
-            CUBE if rng.random() < 0.5 else Rod(*rng.uniform(1.0, 6.0, 2), TURNED @ rotation(rng.normal(size=3), 1.0))
-            for _ in "ab"
-        )
+        rods = (Rod(*rng.uniform(1.0, 6.0, 2), TURNED @ rotation(rng.normal(size=3), 1.0)) for _ in "ab")
+        a, b = (CUBE if rng.random() < 0.5 else rod for rod in rods)
         T = translation(*rng.uniform(-3.0, 3.0, 3)) @ (rotation(rng.normal(size=3), 2.0) if k % 3 else HERE)
         d = convex_depth(a, HERE, b, T)
         if d.upper > -1e-3:
@@ -202,14 +210,13 @@ def plate(middle):
     block = manifold3d.Manifold.cube((100.0, 100.0, 10.0), True).translate((0.0, 0.0, -5.0))
     base = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0.0, -0.1 if middle > 0.0 else 0.01)]
     pyramid = manifold3d.Manifold.hull_points([*base, (0.0, 0.0, middle)])
-    mesh = (block + pyramid if middle > 0.0 else block - pyramid).to_mesh64()
-    return shapes.MeshShape(make_mesh(np.array(mesh.vert_properties)[:, :3], mesh.tri_verts), "off")
+    return manifold_shape(block + pyramid if middle > 0.0 else block - pyramid)
 
 
 def test_a_small_dent_is_not_filled():
     """A tip in a dent of 0.1 by 0.1 mm that is 0.02 mm deep, a part in 1e9 of the plate's volume."""
-    tip_corners = np.array([(0.0, 0.0, -0.01), (0.003, 0.0, 1.0), (-0.003, 0.003, 1.0), (-0.003, -0.003, 1.0)])
-    tip = shapes.MeshShape(make_mesh(tip_corners, [(0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3)]), "off")
+    corners = np.array([(0.0, 0.0, -0.01), (0.003, 0.0, 1.0), (-0.003, 0.003, 1.0), (-0.003, -0.003, 1.0)])
+    tip = manifold_shape(manifold3d.Manifold.hull_points(corners))
     dented = plate(-0.02)
     truth = 0.01 * np.cos(np.arctan(0.02 / 0.05))  # of the tip from the dent's sides
     found = distance(dented, tip)

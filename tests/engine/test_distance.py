@@ -5,18 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 import trimesh
 
 from clamp3d import Distance, Verdict, distance, measure, shapes
 from clamp3d.baselines import contact_model
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.result import PairResult
-from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import inverse
-from clamp3d.geometry.profile import Profile
 from clamp3d.kernel import Cylinder, SweptArc, rotation, signed_distance, translation
-from clamp3d.shapes import make_mesh
+from clamp3d.testing import assert_distance
 from tests.kinds import faceted_shape, mesh_shape
 
 GROOVE = SweptArc(7.0, math.radians(60.0), 50.0)
@@ -111,25 +108,10 @@ def test_a_pin_anywhere_in_the_fitted_bore_of_a_long_tube(z):
     assert distance(tube, shapes.cylinder(2.9, 4.0), translation(0.0, 0.0, z)).value == pytest.approx(0.1, abs=1e-9)
 
 
-@pytest.mark.parametrize("x", [-15.0, -20.0, -25.0])
-def test_bolt_through_the_wall_of_its_hole(x):
-    """The shortest way is back into the hole: 14, 19, 24 mm."""
-    plate = shapes.box((137.0, 60.0, 28.0), holes=[shapes.Hole(11.0)])
-    d = distance(plate, shapes.cylinder(10.0, 160.0), translation(x, 0.0, 0.0))
-    assert d.lower <= x + 1.0 <= d.upper
-
-
-def test_wire_too_thick_for_its_groove_rests_on_both_lips():
-    truth = -3.5 + math.sqrt(7.5**2 - (7.0 * math.sin(GROOVE.half_angle)) ** 2)
-    d = distance(BLOCK, shapes.cylinder(7.5, 80.0))
-    assert -1.0 <= d.lower <= -truth <= d.upper
-
-
 @pytest.mark.parametrize("drop", [0.01, 0.5, 3.0])
 def test_bar_in_a_v_of_a_mesh(drop):
     outline = [(-30, -25), (30, -25), (30, 20), (20, 20), (0, 0), (-20, 20), (-30, 20)]
-    made = trimesh.creation.extrude_polygon(shapely.Polygon(outline), 80.0)
-    block = shapes.MeshShape(make_mesh(made.vertices - (0.0, 0.0, 40.0), made.faces), "off")
+    block = faceted_shape(shapes.extrusion(outline, 80.0), 1.0)
     T = translation(0.0, 5.0 * math.sqrt(2.0) - drop, 0.0) @ rotation([0, 0, 1], math.pi / 4)
     d = distance(block, shapes.box((10.0, 10.0, 20.0)), T)
     assert d.lower - 1e-9 <= -drop <= d.upper + 1e-9
@@ -161,15 +143,12 @@ def test_what_lies_over_a_bore_that_just_opens_a_face_is_measured_to_its_rim(dep
 def test_witnesses_lie_on_the_bodies_where_meshes_decide():
     """A coin of many corners on edge in a tube: no closed form, so the meshes have the last word."""
     tube, turn = shapes.cylinder(8.0, 10.0, bore=5.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
-    outline = Profile.of(*((1.5 * math.cos(x), 1.5 * math.sin(x)) for x in turn.tolist()))
+    coin = shapes.extrusion(1.5 * np.column_stack([np.cos(turn), np.sin(turn)]), 0.5)
     T = translation(3.0, 0.4, 0.3) @ rotation([1, 0.3, 0.2], 1.1)
-    d = distance(tube, shapes.Solid("coin", (Extrusion(outline, "Z", -0.25, 0.25),)), T)
+    d = distance(tube, coin, T)
     assert "meshes" in d.method
-    assert np.linalg.norm(d.point_b - d.point_a) == pytest.approx(d.value, abs=1e-9)
+    assert_distance(d, tube, coin, T, tolerance=1e-9)
     assert d.point_a + d.value * d.normal == pytest.approx(d.point_b, abs=1e-9)
-    assert np.hypot(*d.point_a[:2]) == pytest.approx(5.0, abs=1e-9)
-    x, y, z = np.linalg.inv(T)[:3] @ [*d.point_b, 1.0]
-    assert max(math.hypot(x, y) - 1.5, abs(z) - 0.25) <= 1e-9
 
 
 @pytest.mark.parametrize(
@@ -218,10 +197,6 @@ def test_the_nearer_of_two_pieces_and_whether_it_is_the_only_one():
     assert (near.widened(0.25).lower, near.widened(0.25).upper) == (0.75, 1.25)
     deep = Distance(-3.0, -1.0, p, q, p, estimate=-2.5)
     assert (deep.value, deep.depth, deep.uncertainty) == (-2.5, 2.5, 1.5)
-    assert (replace(deep, estimate=None).depth, near.depth, replace(far, lower=-1.0).of_overlap().lower) == (
-        1.0,
-        0.0,
-        -math.inf,
-    )
-    assert near.of_overlap() is near
+    assert (replace(deep, estimate=None).depth, near.depth) == (1.0, 0.0)
+    assert (replace(far, lower=-1.0).of_overlap().lower, near.of_overlap()) == (-math.inf, near)
     assert (deep.direction is p, near.direction) == (True, None)

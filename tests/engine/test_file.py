@@ -117,10 +117,7 @@ def test_motions():
         (BOX + "pose = { translation = [nan, 0, 0] }\n", "parts.box.pose.translation.0: must be a finite number"),
         (BOX + '[[allowed]]\nparts = ["box", "bax"]\n', "allowed: unknown part 'bax'; available: box"),
         (BOX + '[[allowed]]\nparts = ["box", "box"]\n', "allowed must name two parts, got 'box' twice"),
-        (
-            BOX + '[[motions]]\nparts = ["box"]\n',
-            "motions.0.translate: give exactly one of translate, rotate, screw, to",
-        ),
+        (BOX + '[[motions]]\nparts = ["box"]\n', "motions.0.translate: give exactly one of translate, rotate, screw"),
         ("clearence = 1\n" + BOX, "clearence is not a known key; did you mean clearance?"),
         ("clearance = 0.001\n" + BOX, "clearance must be 0 or > contact = 0.01 mm, got 0.001"),
         ('unit = "inch"\n' + BOX, "unit: must be 'mm', got 'inch'"),

@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -13,8 +14,8 @@ from clamp3d.engine import moving_pair
 from clamp3d.kernel import rotation, translation
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
-from clamp3d.shapes import MeshShape, make_mesh
-from tests.kinds import mesh_shape
+from clamp3d.shapes import make_mesh
+from tests.kinds import manifold_shape, mesh_shape
 
 
 @pytest.mark.parametrize("angle", [1e-13, 1e-10, 1e-6, 2.0])
@@ -41,12 +42,8 @@ def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way()
 
 def test_motions_follow_one_another():
     box, rod = shapes.box((10, 10, 10)), shapes.cylinder(1, 10)
-    scene = (
-        Scene(clearance=2.0)
-        .add("box", box)
-        .add("rod", rod, translation(30, 0, 0))
-        .add("tip", rod, translation(40, 0, 0))
-    )
+    scene = Scene(clearance=2.0).add("box", box).add("rod", rod, translation(30, 0, 0))
+    scene = scene.add("tip", rod, translation(40, 0, 0))
     up = Motion.translate((0, 20, 0), parts=("rod", "tip"), name="up")
     over = Motion.translate((-60, 0, 0), parts=("rod", "tip"), name="over")
     result = check(replace(scene, motions=(up, over)))
@@ -77,14 +74,13 @@ def test_what_counts_as_contact_has_a_first_time(gap):
 
 def joined(*boxes):
     """A mesh of boxes (low, high) that are united."""
-    made = trimesh.boolean.union([trimesh.creation.box(bounds=bounds) for bounds in boxes], engine="manifold")
-    return mesh_shape(made)
+    return mesh_shape(trimesh.boolean.union([trimesh.creation.box(bounds=bounds) for bounds in boxes]))
 
 
-@pytest.mark.parametrize("gap", [0.02])
 @pytest.mark.parametrize("kind", ["slide", "sink", "turn", "screw"])
-def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, gap):
+def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind):
     """A block just above a floor meets a bead on it, a bar that turns there a post: the times are known by hand."""
+    gap = 0.02
     if kind in ("slide", "sink"):  # sinking it is as near as half the gap when it arrives
         floor = joined(((-100, -30, -10), (100, 30, 0)), ((1.5, -10, -1), (3.5, 10, 1)))
         part, start = joined(((-10, -10, 0), (10, 10, 20))), translation(-20.0, 0.0, gap)
@@ -99,8 +95,7 @@ def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, g
     # In frames that nothing is square to.
     A = rotation((0.3, 0.5, 0.8), 0.7)
     turned = replace(way, travel=A[:3, :3] @ way.travel, axis=A[:3, :3] @ way.axis)
-    V = floor.mesh.vertices @ A[:3, :3].T
-    floor = MeshShape(make_mesh(V, floor.mesh.faces), "off")
+    floor = replace(floor, mesh=make_mesh(floor.mesh.vertices @ A[:3, :3].T, floor.mesh.faces))
     hit = first_contact(floor, part, turned, A @ start)
     assert hit.touches
     assert 0.0 <= (truth - hit.t) * length <= 2e-4
@@ -109,12 +104,9 @@ def test_first_contact_of_meshes_does_not_depend_on_what_slides_close_by(kind, g
 
 def test_a_fin_is_met_though_its_foot_is_nearer_the_axis_than_a_plate_that_screws_past():
     """The post itself is never reached: the fin's sides alone are inside the hull of what the plate's face sweeps."""
-    import manifold3d
-
     root = np.array([(0.0, -0.5, -0.5), (0.0, 0.5, -0.5), (0.0, 0.5, 0.5), (0.0, -0.5, 0.5), (20.5, 0.0, 0.0)])
     fin = manifold3d.Manifold.hull_points(root).translate((0.0, 0.0, 30.0))
-    made = (manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin).to_mesh64()
-    post = MeshShape(make_mesh(made.vert_properties, made.tri_verts), "off")
+    post = manifold_shape(manifold3d.Manifold.cylinder(600.0, 17.0, 17.0, 96, True) + fin)
     plate = joined(((20, -100, -0.5), (60, 100, 0.5)))
     motion = Motion.screw((0.0, 0.0, 1.0), 0.15, travel=100.0, parts=("plate",))
     scene = Scene(Scene().add("post", post).add("plate", plate).parts, motions=(motion,))

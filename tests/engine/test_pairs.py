@@ -1,4 +1,4 @@
-"""One pair of parts at a time, against closed forms: verdicts, distances, depths, and where parts overlap."""
+"""One pair of parts at a time, against closed forms: verdicts, depths, common parts, and how pins and holes fit."""
 
 import math
 from dataclasses import replace
@@ -9,25 +9,21 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clamp3d import Distance, Motion, Scene, Verdict, check, distance, shapes
+from clamp3d import Distance, Motion, Part, Scene, Verdict, check, distance, shapes
+from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.refine import from_boxes
+from clamp3d.engine.relations import relation
 from clamp3d.engine.verdict import Thresholds
-from clamp3d.geometry.pose import to_target
-from clamp3d.kernel import SweptArc, rotation, translation
-from clamp3d.shapes import MeshShape, make_mesh
-from tests.kinds import measured_alike, mesh_shape
+from clamp3d.geometry.pose import rotation, to_target, translation
+from clamp3d.shapes import SweptArc
+from tests.kinds import faceted_shape, measured_alike, mesh_shape, row_of
 
 BLOCK = shapes.groove_block(SweptArc(7.0, math.radians(60.0), 50.0), 40.0, 20.0)  # top at -3.5, back at -23.5
 WIRE, CUBE = shapes.cylinder(6.935, 80.0), shapes.box((10, 10, 10))
 CACHE = ModelCache()
 QUARTER = rotation([0, 1, 0], math.pi / 2)
-
-
-def row_of(a, b, T, **settings_):
-    (row,) = check(Scene(**settings_).add("a", a).add("b", b, T)).pairs
-    return row
 
 
 @pytest.mark.parametrize(
@@ -75,8 +71,8 @@ def test_verdicts(b, T, verdict):
 @pytest.mark.parametrize(("hole", "size", "verdict"), [(0.65, 0.01, "contained"), (0.707, 0.33, "clash")])
 def test_a_part_in_a_corner_that_is_thinner_than_the_meshes(hole, size, verdict):
     drilled = shapes.box((1, 1, 10), holes=[shapes.Hole(hole)])  # of 0.707 the finest mesh inside is empty too
-    scene = Scene(contact=1e-4).add("a", drilled).add("b", shapes.box((size, size, size)), translation(0.49, 0.49, 0))
-    assert check(scene).verdict("a", "b").value == verdict
+    row = row_of(drilled, shapes.box((size, size, size)), translation(0.49, 0.49, 0), contact=1e-4)
+    assert row.verdict.value == verdict
 
 
 def test_thresholds():
@@ -89,19 +85,12 @@ def test_thresholds():
 
 
 @pytest.mark.parametrize(("distances", "shift"), [(False, 0.0), (False, 1e-9), (True, 1e-9)])
-@pytest.mark.parametrize(
-    "shape",
-    [
-        shapes.box((50.0, 40.0, 30.0)),
-        shapes.cylinder(12.0, 40.0, bore=8.0),
-        shapes.groove_block(SweptArc(12.0, 1.2, 50.0), 60.0, 30.0),
-    ],
-)
+@pytest.mark.parametrize("shape", [CUBE, shapes.cylinder(12.0, 40.0, bore=8.0), BLOCK])
 def test_a_part_that_is_there_twice_clashes(shape, shift, distances):
     # The surfaces coincide, so no point of either lies deep in the other: only what is between them does.
     T = rotation([1, 2, 3], 0.7) @ translation(5.0, 6.0, 7.0)
     scene = Scene().add("a", shape, T).add("b", replace(shape), T @ translation(shift, 0.0, 0.0))
-    assert check(scene, distances=distances).pairs[0].verdict is Verdict.DUPLICATE
+    assert check(scene, distances=distances).verdict("a", "b") is Verdict.DUPLICATE
 
 
 def test_a_press_fit_is_judged_by_what_the_parts_share():
@@ -137,7 +126,7 @@ def test_a_part_is_contained_that_stands_out_by_no_more_than_its_threshold_and_i
         T = translation(3.5 + error + out, 0.0, 0.0)
         assert kind(box, small, T, 0.01) == verdict
         assert kind(small, box, translation(-T[0, 3], 0.0, 0.0), 0.01) == verdict
-    large = MeshShape(make_mesh(4.5 * cube.vertices, cube.faces), "off", error=error)
+    large = mesh_shape(cube.copy().apply_scale(4.5), error=error)
     assert kind(large, small, translation(3.5 + 2.0 * error + 0.0095, 0.0, 0.0), 0.01) == "contained"
     assert kind(large, small, translation(3.5 + 2.0 * error + 0.0105, 0.0, 0.0), 0.01) == "clash"
 
@@ -200,7 +189,7 @@ def test_crossed_side_by_side_cylinders_share_a_lens(d):
 
 def test_a_motion_tells_where_it_is_deepest_and_is_a_finding():
     scene = Scene().add("a", CUBE).add("b", CUBE, translation(0, 0, 20)).add("c", CUBE, translation(40, 0, 0))
-    result = check(Scene(parts=scene.parts, motions=(Motion.translate((0, 0, -12), parts=("b",), name="down"),)))
+    result = check(scene.with_motion(Motion.translate((0, 0, -12), parts=("b",), name="down")))
     (row,) = result.motions
     assert row.where.to_dict()["volume_at_least_mm3"] > 0.0
     assert row.where.box[:, 2].tolist() == pytest.approx([row.where.box[0, 2], 5.0])
@@ -211,6 +200,64 @@ def test_a_motion_tells_where_it_is_deepest_and_is_a_finding():
 
 
 def test_boxes_leave_out_no_pair_that_counts_as_contact():
-    scene = Scene().add("a", shapes.box(10, 10, 10)).add("b", shapes.box(10, 10, 10), translation(10.0100001, 0, 0))
     for distances in (False, True):
-        assert check(scene, distances=distances).verdict("a", "b") is Verdict.CONTACT
+        assert row_of(CUBE, CUBE, translation(10.0100001, 0, 0), distances=distances).verdict is Verdict.CONTACT
+
+
+TURNED = translation(30.0, -7.0, 4.0) @ [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+
+
+def fit(radius, place=(0.0, 0.0, 0.0), hole=5.0, length=40.0):
+    """A pin in a tube whose bore has a radius of 5."""
+    tube = Part("tube", shapes.cylinder(9.0, 8.0, bore=hole), TURNED)
+    found = relation(tube, Part("pin", shapes.cylinder(radius, length), TURNED @ translation(*place)))
+    return found and (found.kind, found.overlap)
+
+
+def test_the_two_radii_say_how_they_fit():
+    assert [fit(radius) for radius in (4.9, 7.0)] == [None, None]
+    assert [fit(radius) for radius in (4.99, 5.0)] == [("running", 0.0)] * 2
+    assert [fit(radius) for radius in (5.01, 5.1, 6.0)] == [("press", 0.01), ("thread", 0.1), ("thread", 1.0)]
+
+
+@pytest.mark.parametrize("place", [(0.01, 0.0, 0.0), (0.0, 0.0, 24.1), (0.0, 0.0, -24.1)])
+def test_a_pin_beside_or_beyond_its_hole_does_not_fit(place):
+    assert fit(5.01, place) is None
+
+
+def test_the_holes_of_a_block_are_found_wherever_they_are():
+    block = Part("block", shapes.box(40.0, 30.0, 8.0, holes=[shapes.Hole(3.0, (10.0, -2.0))]), TURNED)
+    pin = Part("pin", shapes.cylinder(3.01, 20.0), TURNED @ translation(10.0, -2.0, 3.0))
+    assert relation(block, pin).kind == relation(pin, block).kind == "press"
+
+
+@pytest.mark.parametrize(("found", "kind"), [("round", "press"), ("off", None)])
+def test_meshes_fit_only_where_round_surfaces_are_looked_for(found, kind):
+    block = shapes.box(40.0, 30.0, 8.0, holes=[shapes.Hole(3.0, (10.0, -2.0))])
+    first, second = (faceted_shape(shape, 0.01, found) for shape in (block, shapes.cylinder(3.01, 20.0)))
+    match = relation(Part("block", first), Part("pin", second, translation(10.0, -2.0, 3.0)))
+    assert (match and match.kind) == kind
+
+
+def bolted(*rules, sink=0.0):
+    """A bolt in a nut; ``sink``: how far a pin on a plate stands in the plate."""
+    scene = Scene().add("nut", shapes.cylinder(9.0, 8.0, bore=4.2)).add("bolt", shapes.cylinder(5.0, 40.0))
+    scene = scene.add("plate", shapes.box(20.0, 20.0, 4.0), translation(50.0, 0.0, -2.0))
+    scene = scene.add("pin", shapes.cylinder(5.0, 40.0), translation(50.0, 0.0, 20.0 - sink))
+    return replace(scene, allowed=rules)
+
+
+def test_a_rule_covers_the_overlap_of_the_fit_and_no_other():
+    assert check(bolted(sink=0.5)).counts["clash"] == 2
+    scene = bolted(Allowed(relation="thread"), sink=0.5)
+    verdicts = {frozenset((row.a, row.b)): row.verdict.value for row in check(scene).pairs}
+    assert verdicts == {frozenset(("nut", "bolt")): "allowed", frozenset(("plate", "pin")): "clash"}
+    shallow = check(bolted(Allowed(relation="thread", overlap=0.5)))
+    assert shallow.verdict("nut", "bolt").value == "clash"  # its threads overlap by 0.8
+
+
+def test_duplicates_can_be_meant():
+    ball = shapes.cylinder(5.0, 5.0)
+    scene = Scene().add("a", ball).add("b", ball)
+    assert check(scene).verdict("a", "b").value == "duplicate"
+    assert check(Scene(scene.parts, allowed=(Allowed(relation="duplicate"),))).verdict("a", "b").value == "allowed"

@@ -6,17 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from igl import winding_number
-from OCP.BRep import BRep_Tool
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-from OCP.BRepClass3d import BRepClass3d_SolidClassifier
-from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.TopAbs import TopAbs_State
-from OCP.TopLoc import TopLoc_Location
 
 from clamp3d.files.cad import Key, matrix
-from clamp3d.files.open_cascade import explore
+from clamp3d.files.open_cascade import explore, occ
 from clamp3d.files.solid import BrepSolid, require_open_cascade
 from tests.cad import Tree, ball, bounds, cone, cut, location, moved, ring, rod, shift, volume
 from tests.cad import block as box
@@ -25,7 +17,7 @@ from tests.cad import first_solid as solid_of
 
 def fuse(shape, *others):
     for other in others:
-        shape = BRepAlgoAPI_Fuse(shape, other).Shape()
+        shape = occ.BRepAlgoAPI_Fuse(shape, other).Shape()
     return shape
 
 
@@ -132,7 +124,7 @@ def near(solids, margin=1.0):
 
 def separation(a, b):
     """Distance of two solids by Open CASCADE, mm."""
-    return BRepExtrema_DistShapeShape(a, b).Value()
+    return occ.BRepExtrema_DistShapeShape(a, b).Value()
 
 
 def truth(a, b):
@@ -140,7 +132,7 @@ def truth(a, b):
     distance = separation(a, b)
     if distance > 1e-7:
         return Truth(distance)
-    common = BRepAlgoAPI_Common(a, b).Shape()
+    common = occ.BRepAlgoAPI_Common(a, b).Shape()
     if (shared := volume(common)) <= 1e-9:  # or the boolean has failed: ask some points
         return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
     return Truth(0.0, shared, max(deepest(common, x) for x in (a, b)))
@@ -181,11 +173,11 @@ def deepest_corner(a, b):
     The classifier has faults: it takes points beside a plate with twelve half holes for the middle of it. So what seems
     deep must be wound round by the triangles too.
     """
-    from_boundary, points, place, greatest = from_shell(b), mesh_corners(a), BRepClass3d_SolidClassifier(b), 0.0
+    from_boundary, points, place, greatest = from_shell(b), mesh_corners(a), occ.BRepClass3d_SolidClassifier(b), 0.0
     solid = BrepSolid.of(solid_of(b), "solid")
     for point in points[:: max(1, len(points) // 100)]:
         place.Perform(point, 1e-7)
-        if place.State() == TopAbs_State.TopAbs_IN and (depth := from_boundary(point)) > greatest:
+        if place.State() == occ.TopAbs_State.TopAbs_IN and (depth := from_boundary(point)) > greatest:
             corner = np.array([point.Coord()])
             if depth < 0.1 or winding_number(solid.mesh.vertices, solid.mesh.faces, corner)[0] > 0.5:
                 greatest = depth
@@ -194,10 +186,10 @@ def deepest_corner(a, b):
 
 def mesh_corners(shape):
     """Corners of a mesh of a shape's faces."""
-    BRepMesh_IncrementalMesh(shape, 0.05, False, 0.3, False)
-    points, place = [], TopLoc_Location()
+    occ.BRepMesh_IncrementalMesh(shape, 0.05, False, 0.3, False)
+    points, place = [], occ.TopLoc_Location()
     for face in explore(shape, "FACE"):
-        mesh = BRep_Tool.Triangulation_s(face, place)
+        mesh = occ.BRep_Tool.Triangulation_s(face, place)
         move = place.Transformation()
         points += [mesh.Node(i).Transformed(move) for i in range(1, mesh.NbNodes() + 1)] if mesh is not None else []
     return points
@@ -205,11 +197,11 @@ def mesh_corners(shape):
 
 def from_shell(solid):
     """The distance of a gp_Pnt from a solid's shell, as a function: the shell is made ready once."""
-    between = BRepExtrema_DistShapeShape()
+    between = occ.BRepExtrema_DistShapeShape()
     between.LoadS2(next(iter(explore(solid, "SHELL"))))
 
     def distance(point):
-        between.LoadS1(BRepBuilderAPI_MakeVertex(point).Vertex())
+        between.LoadS1(occ.BRepBuilderAPI_MakeVertex(point).Vertex())
         between.Perform()
         return between.Value()
 

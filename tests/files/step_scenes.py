@@ -16,24 +16,11 @@ def pin():
 def nested(rng):
     """A tree of three levels with a pin that is there three times; and name, volume and pose of each solid."""
     tree = Tree()
-    root, sub, plates, pins = (
-        tree.product("machine"),
-        tree.product("sub, assembly"),
-        tree.product("plate", plate()),
-        tree.product("pin: 5 x 10", pin()),
-    )
+    root, sub = tree.product("machine"), tree.product("sub, assembly")
+    plates, pins = tree.product("plate", plate()), tree.product("pin: 5 x 10", pin())
     a, b, c, d, e = (random_pose(rng) for _ in range(5))
-    tree.put(root, sub, a)
-    tree.put(sub, plates, b)
-    tree.put(sub, pins, c)
-    tree.put(root, sub, d)
-    tree.put(root, pins, e)
+    for parent, child, T in ((root, sub, a), (sub, plates, b), (sub, pins, c), (root, sub, d), (root, pins, e)):
+        tree.put(parent, child, T)
     hole, full = 40 * 20 * 5 - np.pi * 9 * 5, np.pi * 2.5**2 * 10
-    truth = [
-        ("plate_1", hole, a @ b),
-        ("pin-5-x-10_1", full, a @ c),
-        ("plate_2", hole, d @ b),
-        ("pin-5-x-10_2", full, d @ c),
-        ("pin-5-x-10_3", full, e),
-    ]
-    return tree, truth
+    names = "plate_1", "pin-5-x-10_1", "plate_2", "pin-5-x-10_2", "pin-5-x-10_3"
+    return tree, [*zip(names, (hole, full, hole, full, full), (a @ b, a @ c, d @ b, d @ c, e), strict=True)]

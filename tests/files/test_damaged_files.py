@@ -5,7 +5,6 @@ import struct
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +14,11 @@ from clamp3d import InputError, load
 from clamp3d.files.bodies import unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
 from clamp3d.shapes import load_mesh
+from tests.docs.project import ROOT
 from tests.files.test_gltf import Gltf
 from tests.files.threemf import TIP, doubled, write_3mf
 from tests.scenefile.test_parts import ROBOT
 
-ROOT = Path(__file__).parents[2]
 PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()
 COUNT = (len(PIN) - 84) // 50
 TEXT = trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box((1.0, 2.0, 0.1))).encode()
@@ -132,10 +131,10 @@ def test_objects_components_and_build_items_of_3mf(tmp_path):
     np.testing.assert_allclose(np.ptp(third.shape.mesh.vertices, axis=0), 2 * 25.4, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("unit", "mm"), [("micron", 1e-3), ("centimeter", 10.0), ("meter", 1e3), ("foot", 304.8)])
-def test_units_of_3mf(tmp_path, unit, mm):
-    (part,) = load(write_3mf(tmp_path / "a.3mf", unit=unit)).parts
-    np.testing.assert_allclose(np.ptp(part.shape.mesh.vertices, axis=0), mm, rtol=1e-6)
+def test_units_of_3mf(tmp_path):
+    for unit, mm in (("micron", 1e-3), ("centimeter", 10.0), ("meter", 1e3), ("foot", 304.8)):
+        (part,) = load(write_3mf(tmp_path / "a.3mf", unit=unit)).parts
+        np.testing.assert_allclose(np.ptp(part.shape.mesh.vertices, axis=0), mm, rtol=1e-6)
 
 
 @pytest.mark.filterwarnings("error")
@@ -155,11 +154,7 @@ def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
-    n = 20_000
-    rows = "".join(f"v {k} {k % 7} {k % 11}\n" for k in range(n)) + "".join(
-        f"f {k} {k + 1} {k + 2}\n" for k in range(1, n - 2)
-    )
-    (tmp_path / "a.obj").write_text(rows)
+    trimesh.creation.icosphere(5).export(tmp_path / "a.obj")
     monkeypatch.setenv(LIMITS, "1e-6")
     refused(tmp_path / "a.obj", "(takes more than 0.0 GB to read|not read in 0 s); CLAMP3D_READ_LIMITS=4 allows four")
     monkeypatch.setenv(LIMITS, "lots")
@@ -172,9 +167,7 @@ def test_a_reader_that_ends_by_a_signal_is_said_and_the_next_file_is_read(tmp_pa
     (tmp_path / "lib3mf.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     process().close()
-    refused(
-        write_3mf(tmp_path / "a.3mf"), "the reader ended with SIGSEGV: the file is damaged, or uses what the reader"
-    )
+    refused(write_3mf(tmp_path / "a.3mf"), "the reader ended with SIGSEGV: the file is damaged, or uses what the")
     (tmp_path / "lib3mf.py").unlink()
     folder = tmp_path / "cell"
     folder.mkdir()
@@ -260,15 +253,9 @@ def test_where_nothing_can_be_written_files_are_read(tmp_path):
 
     two = '<item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/>'
     write_3mf(tmp_path / "a.3mf", build=two)
-    command = f"{sys.executable} -m clamp3d check a.3mf >&- 2>&-"
-    run = subprocess.run(
-        ["sh", "-c", command],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
-        cwd=tmp_path,
-        check=False,
-        timeout=120,
-    )
-    assert run.returncode == 0
+    command = ["sh", "-c", f"{sys.executable} -m clamp3d check a.3mf >&- 2>&-"]
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))  # noqa: E731
+    assert subprocess.run(command, preexec_fn=limit, cwd=tmp_path, check=False, timeout=120).returncode == 0
 
 
 @pytest.mark.parametrize("key", ["a." * 50_000 + "b = 1", 'x = { "a" . ' + "b . " * 9000 + "c = 1 }"])

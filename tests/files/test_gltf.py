@@ -11,6 +11,7 @@ from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+INSTANCES = "EXT_mesh_gpu_instancing"
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -133,18 +134,12 @@ def bad_cube(g, accessor=None, **primitive):
     ("spoil", "message"),
     [
         (lambda g: g.node(name="bad", mesh=7), "node 1, or its mesh, is not in the file"),
-        (
-            lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 99]]))),
-            r"missing: bad \(face index 99 is out of range for 8 vertices\)",
-        ),
+        (lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 99]]))), r"missing: bad \(face index 99 is out of"),
         (lambda g: g.data.update(scenes=[{"nodes": [0, 9]}]), "node 9, or its mesh, is not in the file"),
+        (lambda g: g.data.update(extensionsRequired=["EXT_meshopt"]), "needs EXT_meshopt, which is not read"),
         (
-            lambda g: g.data.update(extensionsRequired=["EXT_meshopt_compression"]),
-            "needs EXT_meshopt_compression, which is not read",
-        ),
-        (
-            lambda g: g.node(name="bad", mesh=0, extensions={"EXT_mesh_gpu_instancing": {"attributes": {}}}),
-            r"missing: bad \(its instances \(EXT_mesh_gpu_instancing\) are not read\)",
+            lambda g: g.node(name="bad", mesh=0, extensions={INSTANCES: {}}),
+            rf"missing: bad .its instances .{INSTANCES}",
         ),
         (lambda g: g.data.update(scenes=[{"nodes": [0, 0]}]), "in the tree twice"),
         (lambda g: g.node(rotation=[0.0, 0.0, 0.0, 2.0]), "rotation of a node must be a quaternion of length 1, got"),

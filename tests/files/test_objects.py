@@ -44,12 +44,11 @@ def test_what_is_no_body_is_refused():
 
 def test_shapes_of_open_cascade_and_of_cadquery():
     pytest.importorskip("OCP")
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
-    from tests.cad import location, random_pose
+    from tests.cad import location, occ, random_pose
     from tests.files.step_scenes import pin, plate
 
-    assert volumes(load(BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
+    assert volumes(load(occ.BRepPrimAPI_MakeBox(0.1, 0.2, 0.3).Shape())) == pytest.approx([0.006])
     # CadQuery's classes hold a shape in `wrapped`, a Workplane in `vals()`, an assembly a tree with places.
     T, S = random_pose(np.random.default_rng(1)), random_pose(np.random.default_rng(2))
     held = SimpleNamespace(wrapped=pin())
@@ -59,10 +58,8 @@ def test_shapes_of_open_cascade_and_of_cadquery():
     def assembly(name, T, obj, *children):
         return SimpleNamespace(name=name, loc=SimpleNamespace(wrapped=location(T)), obj=obj, children=list(children))
 
-    tree = assembly(
-        "top", T, None, assembly("bolt", S, held), assembly("bolt", np.eye(4), held, assembly("x", S, stack))
-    )
-    scene = load(tree)
+    second = assembly("bolt", np.eye(4), held, assembly("x", S, stack))
+    scene = load(assembly("top", T, None, assembly("bolt", S, held), second))
     assert scene.name == "top"
     assert [p.name for p in scene.parts] == ["bolt_1", "bolt_2", "x_1", "x_2"]
     for part, place in zip(scene.parts, (T @ S, T, T @ S, T @ S), strict=True):
@@ -77,10 +74,8 @@ def test_build123d_parts_and_assemblies():
         with bd.Locations((0, 0, 10)):
             bd.Cylinder(1, 2)
     assert sorted(volumes(load(made))) == pytest.approx([2 * np.pi, 64.0], rel=1e-2)
-    pin = bd.Cylinder(2, 10)
-    pin.label = "pin"
-    plate = bd.Pos(10, 0, 0) * bd.Box(20, 20, 3)
-    plate.label = "plate"
+    pin, plate = bd.Cylinder(2, 10), bd.Pos(10, 0, 0) * bd.Box(20, 20, 3)
+    pin.label, plate.label = "pin", "plate"
     inner = bd.Compound(label="inner", children=[pin, plate])
     inner.location = bd.Location((0, 0, 5), (0, 0, 90))
     whole = bd.Compound(label="whole", children=[inner, bd.Pos(0, -30, 0) * bd.Sphere(3)])

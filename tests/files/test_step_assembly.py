@@ -8,17 +8,10 @@ import pytest
 
 pytest.importorskip("OCP")
 
-from OCP.BRep import BRep_Builder
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_Sewing
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-from OCP.gp import gp_Pnt
-from OCP.STEPCAFControl import STEPCAFControl_Writer
-from OCP.STEPControl import STEPControl_StepModelType
-from OCP.TopoDS import TopoDS_Compound
 
 from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
-from clamp3d.files.open_cascade import explore
+from clamp3d.files.open_cascade import explore, occ
 from clamp3d.geometry.shells import volume
 from tests.cad import Tree, location, random_pose
 from tests.files.step_scenes import nested, pin, plate
@@ -44,8 +37,8 @@ def test_names_places_and_volumes_of_a_tree(written):
 
 
 def test_several_solids_of_one_product_are_several_parts(tmp_path):
-    both = TopoDS_Compound()
-    builder = BRep_Builder()
+    both = occ.TopoDS_Compound()
+    builder = occ.BRep_Builder()
     builder.MakeCompound(both)
     builder.Add(both, plate())
     T = random_pose(np.random.default_rng(3))
@@ -67,15 +60,16 @@ def test_what_has_no_name_is_called_after_what_holds_it_and_names_need_not_be_ut
 
 
 def test_a_shell_is_refused_by_name_and_curves_are_left_out(tmp_path):
-    sewing = BRepBuilderAPI_Sewing()
-    for face in [*explore(BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape(), "FACE")][:5]:  # a box without its top
+    sewing = occ.BRepBuilderAPI_Sewing()
+    for face in [*explore(occ.BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape(), "FACE")][:5]:  # a box without its top
         sewing.Add(face)
     sewing.Perform()
     tree = Tree()
     root = tree.product("top")
     tree.put(root, tree.product("pin", pin()), np.eye(4))
     tree.put(root, tree.product("lid", sewing.SewedShape()), np.eye(4))
-    tree.put(root, tree.product("axis", BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(5, 0, 0)).Edge()), np.eye(4))
+    line = occ.BRepBuilderAPI_MakeEdge(occ.gp_Pnt(0, 0, 0), occ.gp_Pnt(5, 0, 0)).Edge()
+    tree.put(root, tree.product("axis", line), np.eye(4))
     path = tree.write(tmp_path / "shell.step")
     with pytest.raises(InputError, match=r"only 1 of 2 bodies read; missing: lid \(a surface, not a solid\)"):
         load(path)
@@ -164,9 +158,9 @@ def in_files(tmp_path):
     """An assembly of which each part is a file of its own."""
     tree, truth = nested(np.random.default_rng(7))
     tree.tool.UpdateAssemblies()
-    writer = STEPCAFControl_Writer()
+    writer = occ.STEPCAFControl_Writer()
     with chdir(tmp_path):
-        assert writer.Transfer(tree.document, STEPControl_StepModelType.STEPControl_AsIs, "of_")
+        assert writer.Transfer(tree.document, occ.STEPControl_StepModelType.STEPControl_AsIs, "of_")
         writer.Write("machine.step")
     return tmp_path / "machine.step", truth
 

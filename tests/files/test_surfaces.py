@@ -6,19 +6,13 @@ from igl import point_mesh_squared_distance
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex, BRepBuilderAPI_NurbsConvert, BRepBuilderAPI_Transform
-from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 
-from clamp3d import check, load
-from clamp3d.engine.verdict import Verdict
+from clamp3d import Verdict, check, load
 from clamp3d.files import faces
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
-from clamp3d.files.open_cascade import explore, from_bytes, to_bytes
+from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
 from clamp3d.files.tessellation import _deviation, tessellate, triangles_of
-from tests.cad import ball, block, cone, cut, first_solid, moved, random_pose, ring, rod
+from tests.cad import array_of, ball, block, cone, cut, first_solid, moved, random_pose, ring, rod
 from tests.files.assemblies import write_step
 from tests.public.placed_pairs import arch
 
@@ -32,13 +26,13 @@ SOLIDS = {
 
 
 def as_splines(shape):
-    return BRepBuilderAPI_NurbsConvert(shape, True).Shape()
+    return occ.BRepBuilderAPI_NurbsConvert(shape, True).Shape()
 
 
 def off_face(face, points):
     """Distance (k,) of points (k, 3) from a face by Open CASCADE, mm."""
-    vertices = (BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex() for point in points)
-    return np.array([BRepExtrema_DistShapeShape(face, vertex).Value() for vertex in vertices])
+    vertices = (occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex() for point in points)
+    return np.array([occ.BRepExtrema_DistShapeShape(face, vertex).Value() for vertex in vertices])
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -48,9 +42,9 @@ def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines
     shape, kinds = SOLIDS[name]
     shape = as_splines(shape) if splines else shape
     if mirrored:
-        mirror = gp_Trsf()
-        mirror.SetMirror(gp_Ax2(gp_Pnt(1, 2, 3), gp_Dir(1, 1, 0)))
-        shape = BRepBuilderAPI_Transform(shape, mirror, True).Shape()
+        mirror = occ.gp_Trsf()
+        mirror.SetMirror(occ.gp_Ax2(occ.gp_Pnt(1, 2, 3), occ.gp_Dir(1, 1, 0)))
+        shape = occ.BRepBuilderAPI_Transform(shape, mirror, True).Shape()
     brep = to_bytes(first_solid(moved(shape, random_pose(np.random.default_rng(2)))))
     triangles, form = tessellate(brep, 0.05), faces.surfaces(brep)
     assert set(form.kind.tolist()) == kinds
@@ -68,7 +62,7 @@ def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines
 
 def test_a_bump_between_the_places_that_open_cascade_looks_at_is_found(monkeypatch):
     solid = first_solid(as_splines(ball(5)))
-    spline = faces.occ.BRep_Tool.Surface_s(next(explore(solid, "FACE")))
+    spline = occ.BRep_Tool.Surface_s(next(explore(solid, "FACE")))
     data = SPHERE, np.vstack([np.zeros(3), np.eye(3)]), np.array([5.0, 0.0])
     for a, b in ((0.0, np.pi / 3), (np.pi / 3, 2 * np.pi / 3)):
         for share in (0.25, 0.5, 0.75):
@@ -77,38 +71,38 @@ def test_a_bump_between_the_places_that_open_cascade_looks_at_is_found(monkeypat
     with monkeypatch.context() as patch:
         patch.setattr(faces, "_MOST_PLACES", 100)
         assert not faces._coincides(spline, *data)
-    spline.SetPole(4, 2, spline.Pole(4, 2).Translated(faces.occ.gp_Vec(0, 0, 1e-5)))
+    spline.SetPole(4, 2, spline.Pole(4, 2).Translated(occ.gp_Vec(0, 0, 1e-5)))
     assert not faces._coincides(spline, *data)
 
 
 def test_what_bends_up_as_much_as_down_is_no_plane():
-    spline = faces.occ.BRep_Tool.Surface_s(next(explore(as_splines(block((0, 0, 0), (4, 4, 4))), "FACE")))
+    spline = occ.BRep_Tool.Surface_s(next(explore(as_splines(block((0, 0, 0), (4, 4, 4))), "FACE")))
     spline.IncreaseDegree(3, 3)
-    plane = faces.occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(1e-7)
-    kind, *data = faces._form(faces.occ.GeomAdaptor_Surface(plane))
+    plane = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(1e-7)
+    kind, *data = faces._form(occ.GeomAdaptor_Surface(plane))
     assert faces._coincides(spline, kind, *data)
-    normal = faces.occ.gp_Vec(*data[0][3].tolist())
+    normal = occ.gp_Vec(*data[0][3].tolist())
     for u, v, rise in ((2, 2, 1e-5), (3, 2, -1e-5), (2, 3, -1e-5), (3, 3, 1e-5)):  # nothing at the middle
         spline.SetPole(u, v, spline.Pole(u, v).Translated(normal * rise))
     assert not faces._coincides(spline, kind, *data)
 
 
 def test_what_open_cascade_takes_for_a_sphere_is_looked_at_once_more(monkeypatch):
-    class Loose(faces.occ.GeomConvert_SurfToAnaSurf):
+    class Loose(occ.GeomConvert_SurfToAnaSurf):
         def ConvertToAnalytical(self, _):
             return super().ConvertToAnalytical(0.1)
 
     egg = first_solid(as_splines(ball(5)))
-    spline = faces.occ.BRep_Tool.Surface_s(next(explore(egg, "FACE")))
-    spline.SetPole(3, 2, spline.Pole(3, 2).Translated(faces.occ.gp_Vec(0, 0, 1e-5)))
-    monkeypatch.setattr(faces.occ, "GeomConvert_SurfToAnaSurf", Loose)
+    spline = occ.BRep_Tool.Surface_s(next(explore(egg, "FACE")))
+    spline.SetPole(3, 2, spline.Pole(3, 2).Translated(occ.gp_Vec(0, 0, 1e-5)))
+    monkeypatch.setattr(occ, "GeomConvert_SurfToAnaSurf", Loose)
     assert faces.surfaces(to_bytes(first_solid(as_splines(ball(5))))).kind.tolist() == [SPHERE]
     assert faces.surfaces(to_bytes(egg)).kind.tolist() == [OTHER]
 
 
 def test_corners_beside_a_surface_add_to_the_errors_of_its_triangles():
     shape = first_solid(rod(3, 0, 5))
-    BRepMesh_IncrementalMesh(shape, 0.05)
+    occ.BRepMesh_IncrementalMesh(shape, 0.05)
     every = [*explore(shape, "FACE")]
     form = faces.surfaces_of(every)
     for k, face in enumerate(every):
@@ -138,24 +132,12 @@ def test_no_triangle_is_further_from_its_face_than_its_error(name, splines):
 
 def bumpy(count, at, height):
     """A spline over 40 x 40 mm, flat but for a bump, with the highest of ``count`` x ``count`` poles at ``at``."""
-    try:
-        from OCP.collections import Array1_double as Reals
-        from OCP.collections import Array1_int as Integers
-        from OCP.collections import Array2_gp_Pnt as Points
-    except ModuleNotFoundError:
-        from OCP.TColgp import TColgp_Array2OfPnt as Points
-        from OCP.TColStd import TColStd_Array1OfInteger as Integers
-        from OCP.TColStd import TColStd_Array1OfReal as Reals
     ends = np.linspace(0.0, 40.0, count - 2)
     every = np.concatenate([[0.0] * 3, ends, [40.0] * 3])
     across = [float(every[k + 1 : k + 4].mean()) for k in range(count)]
-    poles, knots, times = Points(1, count, 1, count), Reals(1, count - 2), Integers(1, count - 2)
-    for i, j in np.ndindex(count, count):
-        poles.SetValue(i + 1, j + 1, gp_Pnt(across[i], across[j], height if (i, j) == at else 0.0))
-    for k, knot in enumerate(ends.tolist()):
-        knots.SetValue(k + 1, knot)
-        times.SetValue(k + 1, 4 if k in (0, count - 3) else 1)
-    return faces.occ.Geom_BSplineSurface(poles, knots, knots, times, times, 3, 3)
+    poles = [[occ.gp_Pnt(x, y, height * ((i, j) == at)) for j, y in enumerate(across)] for i, x in enumerate(across)]
+    knots, times = array_of("double", ends.tolist()), array_of("int", [4, *[1] * (count - 4), 4])
+    return occ.Geom_BSplineSurface(array_of("gp_Pnt", poles), knots, knots, times, times, 3, 3)
 
 
 @pytest.mark.parametrize(
@@ -165,8 +147,8 @@ def test_no_bump_of_a_spline_is_overlooked(count, at, offset):
     """Open CASCADE's own mesh of 0.1 mm leaves out all of a bump that is 0.89 mm high."""
     surface = bumpy(count, at, 2.0)
     if offset:
-        surface = faces.occ.Geom_OffsetSurface(surface, offset)
-    made = tessellate(to_bytes(faces.occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()), 0.1)
+        surface = occ.Geom_OffsetSurface(surface, offset)
+    made = tessellate(to_bytes(occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()), 0.1)
     u, v = (40.0 * (index - 1) / (count - 3) for index in at)
     true = [surface.Value(u + du, v + dv).Coord() for du in np.linspace(-3, 3, 25) for dv in np.linspace(-3, 3, 25)]
     assert max(z for _, _, z in true) > offset + 0.8
@@ -177,17 +159,10 @@ def test_no_bump_of_a_spline_is_overlooked(count, at, offset):
 
 def patch(heights):
     """A face over 20 x 20 mm whose heights are a polynomial, by its Bezier poles (n, m)."""
-    try:
-        from OCP.collections import Array2_gp_Pnt as Points
-    except ModuleNotFoundError:
-        from OCP.TColgp import TColgp_Array2OfPnt as Points
-    count = np.array(np.shape(heights))
-    poles = Points(1, int(count[0]), 1, int(count[1]))
-    for index in np.ndindex(*count):
-        x, y = (20.0 * np.array(index) / (count - 1)).tolist()
-        poles.SetValue(index[0] + 1, index[1] + 1, gp_Pnt(x, y, float(heights[index])))
-    surface = faces.occ.Geom_BezierSurface(poles)
-    return surface, faces.occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
+    x, y = (np.linspace(0.0, 20.0, count) for count in np.shape(heights))
+    poles = [[occ.gp_Pnt(x[i], y[j], z) for j, z in enumerate(row)] for i, row in enumerate(heights.tolist())]
+    surface = occ.Geom_BezierSurface(array_of("gp_Pnt", poles))
+    return surface, occ.BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
 
 
 CROWN = np.outer([0.0, 2.0, 0.0], [0.0, 1.2, 0.0])
@@ -207,7 +182,7 @@ def test_a_face_is_as_near_to_its_triangles_as_said_between_the_middles_of_their
 
 def test_a_pin_that_stands_in_a_crowned_face_clashes(tmp_path):
     """Between their edges the coarse triangles of the face are 0.15 mm off it."""
-    plate = BRepPrimAPI_MakePrism(patch(CROWN)[1], gp_Vec(0.0, 0.0, -5.0)).Shape()
+    plate = occ.BRepPrimAPI_MakePrism(patch(CROWN)[1], occ.gp_Vec(0.0, 0.0, -5.0)).Shape()
     parts = {"plate": plate, "pin": block((4.95, 9.95, 0.4), (5.05, 10.05, 8.0))}  # the face is at 0.45 mm there
     (row,) = check(load(write_step(parts, tmp_path / "crown.step")), depths=False).pairs
     assert row.verdict is Verdict.CLASH
@@ -215,8 +190,8 @@ def test_a_pin_that_stands_in_a_crowned_face_clashes(tmp_path):
 
 def test_a_bump_that_stands_in_another_part_clashes(tmp_path):
     """Open CASCADE's own distance says that plate and lid are 0.09 mm apart: it leaves out the bump."""
-    face = faces.occ.BRepBuilderAPI_MakeFace(faces.occ.Geom_OffsetSurface(bumpy(81, (29, 51), 2.0), 1.0), 1e-7).Face()
-    plate = BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, -9.0)).Shape()
+    face = occ.BRepBuilderAPI_MakeFace(occ.Geom_OffsetSurface(bumpy(81, (29, 51), 2.0), 1.0), 1e-7).Face()
+    plate = occ.BRepPrimAPI_MakePrism(face, occ.gp_Vec(0.0, 0.0, -9.0)).Shape()
     parts = {"plate": plate, "lid": block((0.0, 0.0, 1.09), (40.0, 40.0, 6.0))}
     (row,) = check(load(write_step(parts, tmp_path / "bump.step")), depths=False).pairs
     assert row.verdict is Verdict.CLASH

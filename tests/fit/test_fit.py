@@ -55,16 +55,9 @@ def test_exact_tessellation_has_no_facet_bias(chord_error):
 
 
 def test_every_round_surface_of_the_reference_clamp_is_found_and_no_other():
-    fits = {name: fitted(meshing.mesh(part, 0.05)) for name, part in parts(load_clamp()).items()}
-    assert {name: (len(f.grooves), len(f.cylinders), len(f.holes)) for name, f in fits.items()} == {
-        "P1": (2, 0, 1),
-        "P2": (2, 1, 0),
-        "P3": (1, 0, 1),
-        "P4": (0, 1, 0),
-        "P5": (0, 0, 1),
-        "P6": (0, 1, 0),
-        "P7": (0, 1, 0),
-    }
+    fits = [fitted(meshing.mesh(part, 0.05)) for part in parts(load_clamp()).values()]
+    counts = [(len(f.grooves), len(f.cylinders), len(f.holes)) for f in fits]
+    assert counts == [(2, 0, 1), (2, 1, 0), (1, 0, 1), (0, 1, 0), (0, 0, 1), (0, 1, 0), (0, 1, 0)]  # P1 to P7
 
 
 def test_mirrored_part_keeps_its_grooves():

@@ -1,13 +1,17 @@
-"""From mesh files to features: formats, and what is repaired on the way."""
+"""From mesh files to features: formats, what is repaired on the way, and the command."""
+
+import json
+import re
 
 import manifold3d
 import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import InputError, fit_file, fit_mesh
+from clamp3d import fit_file, fit_mesh
 from clamp3d.shapes import make_mesh
 from tests.fit.fit_shapes import RADIUS, splint
+from tests.refusals import refusals
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +29,7 @@ def test_formats_in_mm(part, tmp_path, kind):
     assert any("carries no unit" in note for note in result.notes) == (kind != "3mf")
 
 
-def test_other_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"unknown mesh format '.dxf'; available: .stl"):
-        fit_file(tmp_path / "a.dxf")
+test_other_files_are_refused = refusals((lambda: fit_file("a.dxf"), r"unknown mesh format '.dxf'; available: .stl"))
 
 
 def with_slivers(mesh, edges, height):
@@ -60,3 +62,25 @@ def test_watertight_is_true_of_what_is_returned(part, height, float32):
             area = trimesh.triangles.area(mesh.vertices[mesh.faces[feature.faces]]).sum()
             assert area == pytest.approx(feature.covered_area, rel=1e-9)
             assert not mesh.slivers[feature.faces].any()
+
+
+def test_table_json_and_page(tmp_path, main):
+    splint(0.05, hole=11.0).export(tmp_path / "part.stl")
+    code, out, err = main("fit", tmp_path / "part.stl", "--json", tmp_path / "a.json", "--html", tmp_path / "a.html")
+    assert code == 0
+    assert re.search(r"^G1 +groove +23\.8012 ", out, re.MULTILINE)
+    assert re.search(r"^H1 +through hole +11\.0000 ", out, re.MULTILINE)
+    assert "note: STL carries no unit" in err
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert [round(g["radius_mm"], 4) for g in data["grooves"]] == [RADIUS] * 2
+    assert all(g["error_bound_mm"] >= g["fit_error_mm"] > 0.0 for g in data["grooves"])
+    page = (tmp_path / "a.html").read_text()
+    assert not re.search(r"""(src|href)\s*=|https?://|@import""", page)
+    assert page.count("data-feature=") == 3
+
+
+def test_mesh_without_features_is_an_answer(tmp_path, main):
+    trimesh.creation.box([1.0, 2.0, 3.0]).export(tmp_path / "box.ply")
+    code, out, _ = main("fit", tmp_path / "box.ply", "--html", tmp_path / "b.html")
+    assert (code, "no groove, no cylinder, no hole" in out) == (0, True)
+    assert "<tbody>" not in (tmp_path / "b.html").read_text()

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clamp3d import shapes
-from clamp3d.kernel import SweptArc
-from clamp3d.shapes import mesh
+from clamp3d.shapes import SweptArc, mesh
 from tests.fuzz.rules import assert_outputs, call, examples, is_refused, new_folder
 from tests.fuzz.samples import CLAMP, SCENE, TETRA
 from tests.fuzz.spoil import pick, power, spoil, spoil_bytes, to_toml
@@ -83,7 +82,7 @@ def assert_plausible(code, data):
 
 
 def bad_mesh(draw):
-    """The grooved block of another size, far away, flat, rough or twice; tests/baselines/test_solid.py has more."""
+    """The grooved block of another size, far away, flat, rough or twice; tests/geometry/test_mesh.py has more."""
     V, F = np.array(BLOCK.vertices), np.array(BLOCK.faces)
     rough = np.random.default_rng(draw(st.integers(0, 2**32 - 1))).normal(0.0, power(draw, -6, 1), V.shape)
     changed = [V * power(draw, -40, 40), V + power(draw, 0, 38), V * [1.0, 0.0, 1.0], V + rough]

@@ -1,13 +1,20 @@
-"""Meshes: damage of every kind, whose count is known, is mended and noted; edges are those counted one by one."""
+"""Meshes: damage of every kind is mended and noted, or refused by name; edges; nearest points of triangles."""
 
 import collections
 
 import numpy as np
 import pytest
+import scipy.optimize
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from trimesh.triangles import closest_point
 
-from clamp3d.geometry.mesh import edges_of, is_closed, make_mesh
+from clamp3d import InputError
+from clamp3d.geometry.mesh import closed_mesh, edges_of, is_closed, make_mesh
 from clamp3d.geometry.shells import inside_out, shells, volume, winding_numbers
+from clamp3d.geometry.triangles import closest_points
 
 BOX, BALL = trimesh.creation.box((2.0, 3.0, 4.0)), trimesh.creation.icosphere(2, 2.0)
 CAVITY = trimesh.Trimesh(0.3 * BALL.vertices + (0.2, 0.5, 0.1), BALL.faces[:, ::-1], process=False)
@@ -100,3 +107,69 @@ def test_what_a_surface_winds_round():
     wanted = 1.0 * (out < 2.0) - (into < 0.6)
     for some in (sure, sure[:8]):
         assert winding_numbers(V, F, x[some]) == pytest.approx(wanted[some], abs=1e-9)
+
+
+V, F = np.add(BOX.vertices, (1.0, 1.5, 2.0)), np.array(BOX.faces)
+
+
+def _with(array, row, value):
+    out = array.astype(np.result_type(array, np.asarray(value)))
+    out[row] = value
+    return out
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "rule"),
+    [
+        (_with(V, 3, np.nan), F, "vertex 3 is not finite, or not within 1e+12 mm: [nan, nan, nan]"),
+        (np.zeros((0, 3)), F, "is out of range for 0 vertices"),
+        (V, np.zeros((0, 3), dtype=int), "faces must have shape (m, 3), got (0, 3)"),
+        (V[:, :2], F, "must have shape (n, 3), got (8, 2)"),
+        ([[0, 0], [1, 2, 3]], F, "must be an array of numbers"),
+        (V, _with(F, 5, [0, 1, 8]), "face index 8 is out of range for 8 vertices"),
+        (V, _with(F, 5, [0, 1, 2.5]), "faces must be integers, got float64"),
+        (V, _with(F, 5, [0, 5, 5]), "not closed: 3 edges with one triangle"),
+        (V, F[1:], "not closed: 3 edges with one triangle"),
+        (np.vstack([V, V + 9.0]), np.vstack([F, F[:, ::-1] + 8]), "a body of 12 triangles inside out"),
+        (np.vstack([2.0 * V, V - 9.0]), np.vstack([F, F[:, ::-1] + 8]), "a body of 12 triangles inside out"),
+        (np.vstack([2.0 * V, V - 1.0]), np.vstack([F, F[:, ::-1] + 8]), "a body of 12 triangles inside out"),
+        (_with(V, 3, 1e300), F, "within 1e+12 mm"),
+        (V, np.vstack([F, F[:1]]), "1 doubled triangles left out"),
+        (V, np.vstack([F[:1, ::-1], F[1:]]), "1 triangles turned to one winding"),
+        (V, F[:, ::-1], "inside out: all triangles turned"),
+        (V * [1.0, 1.0, 0.0], F, "the surface encloses no volume"),
+    ],
+)
+def test_bad_mesh_is_one_clear_line(vertices, faces, rule):
+    with pytest.raises(InputError) as caught:
+        closed_mesh(vertices, faces, "part P9")
+    message = str(caught.value)
+    assert message.startswith("part P9")
+    assert rule in message
+    assert "\n" not in message
+
+
+def test_corners_of_triangles_are_merged_and_cavities_kept():
+    assert len(closed_mesh(V[F].reshape(-1, 3), np.arange(36).reshape(-1, 3)).vertices) == 8
+    assert len(closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8])).faces) == 24
+
+
+numbers = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
+
+
+@given(hnp.arrays(float, (5, 3, 3), elements=numbers), hnp.arrays(float, (5, 3), elements=numbers))
+@settings(deadline=None, max_examples=150)
+def test_nearest_points_of_triangles(triangles, points):
+    """No further away than trimesh's, and points of the triangles (of no area too)."""
+    found = closest_points(triangles, points)
+    away = np.linalg.norm(found - points, axis=1)
+    with np.errstate(invalid="ignore"):  # trimesh 5.0 divides by areas that are zero
+        theirs = np.linalg.norm(closest_point(triangles, points) - points, axis=1)
+    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    assert (away <= theirs + 1e-9).all()
+    small = np.linalg.norm(closest_points(1e-3 * triangles, 1e-3 * points) - 1e-3 * points, axis=1)
+    assert np.abs(1e3 * small - away).max() < 1e-9  # sides may be far shorter than a millimetre
+    assert np.abs(away - theirs)[area > 1e-2].max(initial=0.0) < 1e-9
+    for triangle, point in zip(triangles, found, strict=True):
+        shares = scipy.optimize.nnls(np.vstack([triangle.T, np.full(3, 1e3)]), np.append(point, 1e3))
+        assert shares[1] < 1e-6

@@ -1,14 +1,13 @@
 """The compiled kernel's start: kept by numba, announced when it is compiled, and never an error without a cache."""
 
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[2] / "clamp3d"
+from tests.docs.project import ROOT, python
+
+PACKAGE = ROOT / "clamp3d"
 GAME = """
 from clamp3d.kernel.jit import formula
 
@@ -27,15 +26,8 @@ def plays(R, r):
 
 
 def run(code: str, folder: Path, **env: str) -> tuple[list[str], str]:
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": str(folder), **env},
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=folder,
-        timeout=600,
-    )
+    done = python("-c", code, cwd=folder, PYTHONPATH=str(folder), **env)
+    assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr
 
 

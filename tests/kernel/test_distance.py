@@ -13,6 +13,7 @@ from clamp3d.kernel.relation import relative_pose
 from clamp3d.kernel.vector import Vector
 from clamp3d.testing import body
 from tests.kernel.oracle import axis_distance, axis_of, exact_distance, load, surface_distance
+from tests.refusals import refusals
 
 CASES = load()
 
@@ -152,31 +153,26 @@ def test_limits():
     assert signed_distance(sheet, Capsule(1.0, 4.0), translation(0.0, -20.0, 5.0)).distance == pytest.approx(2.0)
 
 
-def test_bad_shapes_of_input():
-    groove, wire = SweptArc(12.0, 1.0, 50.0), Capsule(5.0, 80.0)
-    for pose in (np.eye(3), np.zeros((2, 4, 4)), "up", None, [[1, 2], [3]]):
-        with pytest.raises(InputError, match="pose"):
-            signed_distance(groove, wire, pose)
-    for batch in (np.eye(4), np.zeros((2, 3, 4)), "up"):
-        with pytest.raises(InputError, match="poses"):
-            signed_distances(groove, wire, batch)
-    with pytest.raises(InputError, match="workers must be a whole number >= 1, got 0"):
-        signed_distances(groove, wire, np.eye(4)[None], workers=0)
-    for kind, *sizes in (
-        (Capsule, 1e200, 1.0),
-        (Capsule, 1.0, math.nan),
-        (SweptArc, -1.0, 1.0, 1.0),
-        (SweptArc, 1.0, 4.0, 1.0),
-    ):
-        with pytest.raises(InputError, match=r"must be .*got"):
-            kind(*sizes)
-    assert signed_distances(groove, wire, np.empty((0, 4, 4))).shape == (0,)
-    # Any layout and number type gives the same answer.
+BAR = SweptArc(12.0, 1.0, 50.0), Capsule(5.0, 80.0)
+NO_POSE, NO_POSES = (np.eye(3), np.zeros((2, 4, 4)), "up", None, [[1, 2], [3]]), (np.eye(4), np.zeros((2, 3, 4)), "up")
+test_bad_shapes_of_input = refusals(
+    *((lambda pose=pose: signed_distance(*BAR, pose), "pose") for pose in NO_POSE),
+    *((lambda batch=batch: signed_distances(*BAR, batch), "poses") for batch in NO_POSES),
+    (lambda: signed_distances(*BAR, np.eye(4)[None], workers=0), "workers must be a whole number >= 1, got 0"),
+    (lambda: Capsule(1e200, 1.0), r"must be .*got"),
+    (lambda: Capsule(1.0, math.nan), r"must be .*got"),
+    (lambda: SweptArc(-1.0, 1.0, 1.0), r"must be .*got"),
+    (lambda: SweptArc(1.0, 4.0, 1.0), r"must be .*got"),
+)
+
+
+def test_any_layout_and_number_type_gives_the_same_answer():
     T = translation(1.0, -2.0, 3.0) @ rotation((1, 1, 0), 0.1)
-    expected = signed_distance(groove, wire, T).distance
+    expected = signed_distance(*BAR, T).distance
     for other in (np.asfortranarray(T), T.tolist()):
-        assert signed_distance(groove, wire, other).distance == expected
-        assert signed_distances(groove, wire, [other])[0] == expected
+        assert signed_distance(*BAR, other).distance == expected
+        assert signed_distances(*BAR, [other])[0] == expected
+    assert signed_distances(*BAR, np.empty((0, 4, 4))).shape == (0,)
 
 
 NEARLY_IN = [

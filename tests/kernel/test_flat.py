@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
-from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, groove_pieces, rotation, signed_distance, translation
+from clamp3d.kernel import Capsule, Cylinder, Feature, SweptArc, groove_pieces, rotation, signed_distance
 from tests.kernel.oracle import point_distance, surface_distance
 from tests.kinds import poses
 
@@ -141,21 +141,6 @@ def test_the_normal_at_contact_is_that_before_it():
             same += 1
             assert np.abs(at.normal - before.normal).max() <= 0.1
     assert same > 400
-
-
-@pytest.mark.parametrize(
-    ("T", "wanted", "feature"),
-    [
-        (translation(0.0, -3.0, 73.0), 3.0, Feature.END_ARC),  # the end before the end face
-        (translation(0.0, -3.0, 67.0), -1.5, Feature.ARC),  # in the groove, too low by the rest of the radius
-        (translation(0.0, -40.0, 70.5), 0.5, Feature.END_FACE),
-        (translation(0.0, -40.0, 69.0), -1.0, Feature.END_FACE),
-    ],
-)
-def test_ends_before_an_end_face(T, wanted, feature):
-    found = signed_distance(SweptArc(12.0, math.radians(70.0), 60.0), Cylinder(10.5, 80.0), T)
-    assert found.distance == pytest.approx(wanted, abs=1e-13)
-    assert found.feature is feature
 
 
 @settings(deadline=None)

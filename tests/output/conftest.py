@@ -20,10 +20,8 @@ def reference():
 def odd_poses():
     """A turned and moved pose for each part: a transposed matrix or a swapped axis cannot hide in it."""
     generator = np.random.default_rng(7)
-    poses = {}
-    for name in PARTS:
-        poses[name] = translation(*(200.0 * generator.normal(size=3))) @ rotation(generator.normal(size=3), 2.0)
-    return poses
+    numbers = {name: generator.normal(size=(2, 3)) for name in PARTS}
+    return {name: translation(*(200.0 * place)) @ rotation(axis, 2.0) for name, (place, axis) in numbers.items()}
 
 
 @pytest.fixture(scope="session")

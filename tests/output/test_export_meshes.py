@@ -1,4 +1,4 @@
-"""Every mesh format read back by a reader that had no part in writing it."""
+"""Every mesh format read back by a reader that had no part in writing it; the command, and the committed review set."""
 
 import hashlib
 import json
@@ -18,10 +18,13 @@ from clamp3d.geometry.meshing import volume_bounds
 from clamp3d.kernel import translation
 from clamp3d.output.export import FORMATS
 from clamp3d.output.palette import PART_COLOURS
+from tests.docs.project import ROOT, python
+from tests.kinds import mesh_shape
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 MESH_ERROR = 0.02
 FACETED = [f for f in FORMATS if f != "step"]
+COLOURS = {name: trimesh.visual.color.hex_to_rgba(colour)[:3] for name, colour in PART_COLOURS.items()}
 
 
 def read_glb(path):
@@ -33,9 +36,7 @@ def read_glb(path):
 
 @pytest.mark.parametrize("format", ["stl", "ply"])
 def test_a_format_that_would_lose_accuracy_is_refused(reference, tmp_path, format):
-    far = np.eye(4)
-    far[0, 3] = 1e6
-    scene = clamp_scene(reference, dict.fromkeys(PARTS, far))
+    scene = clamp_scene(reference, dict.fromkeys(PARTS, translation(1e6, 0.0, 0.0)))
     with pytest.raises(InputError, match=rf"{format} holds 32-bit numbers: the pose of P1 up splint would lose 0\.03"):
         export(scene, tmp_path / format, format=format)
     assert not (tmp_path / format).exists()
@@ -72,8 +73,7 @@ def test_every_format_is_read_back_in_its_place(reference, odd_poses, odd_scene,
         if format in ("stl", "ply", "obj"):
             assert f"unit {unit}".encode() in text
         if format == "ply":
-            colour = trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]
-            assert (np.asarray(solid.visual.vertex_colors)[:, :3] == colour).all()
+            assert (np.asarray(solid.visual.vertex_colors)[:, :3] == COLOURS[name]).all()
 
 
 def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
@@ -92,7 +92,7 @@ def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
         (primitive,) = tree["meshes"][child["mesh"]]["primitives"]
         colour = tree["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorFactor"]
         srgb = [12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in colour[:3]]
-        assert [round(255 * c) for c in srgb] == list(trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3])
+        assert [round(255 * c) for c in srgb] == COLOURS[name].tolist()
 
 
 def test_obj_has_named_coloured_objects(odd_scene, tmp_path):
@@ -101,8 +101,7 @@ def test_obj_has_named_coloured_objects(odd_scene, tmp_path):
     assert set(scene.geometry) == {f"{n}_{TITLES[n].replace(' ', '_')}" for n in PARTS}
     for name in PARTS:
         solid = scene.geometry[f"{name}_{TITLES[name].replace(' ', '_')}"]
-        colour = trimesh.visual.color.hex_to_rgba(PART_COLOURS[name])[:3]
-        np.testing.assert_allclose(solid.visual.material.main_color[:3], colour, atol=1)
+        np.testing.assert_allclose(solid.visual.material.main_color[:3], COLOURS[name], atol=1)
         assert f"newmtl {name}_" in materials.read_text()
 
 
@@ -197,12 +196,10 @@ def test_any_name_gives_readable_files(odd_scene, tmp_path):
 @pytest.mark.parametrize("name", ["world", "root", "P3"])
 def test_names_of_a_file_and_its_parts_are_apart_from_those_of_the_writer(odd_scene, tmp_path, name):
     """A clamp called "world" became trimesh's own root: its parts lost the turn to Y up."""
-    plain, odd = (
-        trimesh.load(export(replace(odd_scene, name=n), tmp_path / f"{i}.glb", mesh_error=0.5).files[0])
-        for i, n in enumerate(("reference", name))
-    )
-    np.testing.assert_array_equal(odd.bounds, plain.bounds)
-    tree = read_glb(tmp_path / "1.glb")
+    plain = export(odd_scene, tmp_path / "plain.glb", mesh_error=0.5).files[0]
+    odd = export(replace(odd_scene, name=name), tmp_path / "odd.glb", mesh_error=0.5).files[0]
+    np.testing.assert_array_equal(trimesh.load(odd).bounds, trimesh.load(plain).bounds)
+    tree = read_glb(odd)
     (root,) = (tree["nodes"][i] for i in tree["scenes"][tree["scene"]]["nodes"])
     assert root["name"] == name
     assert [tree["nodes"][i]["name"] for i in root["children"]] == [f"{n} {TITLES[n]}" for n in PARTS]
@@ -216,9 +213,7 @@ def test_a_scene_of_drawn_solids_and_meshes(tmp_path):
     block = trimesh.creation.box((4.0, 6.0, 8.0))
     tube = shapes.cylinder(5.0, 40.0, bore=3.0)
     scene = Scene(name="pair").add("tube", tube, translation(0, 0, 7))
-    scene = scene.add("a/b", shapes.MeshShape(shapes.make_mesh(block.vertices, block.faces))).add(
-        "a-b", shapes.box((1, 1, 1))
-    )
+    scene = scene.add("a/b", mesh_shape(block)).add("a-b", shapes.box((1, 1, 1)))
     written = export(scene, tmp_path / "pair.STL", mesh_error=0.2)
     assert [p.name for p in (*written.files, written.manifest)] == ["pair.STL", "pair.STL.manifest.json"]
     listing = json.loads(written.manifest.read_text())
@@ -240,3 +235,48 @@ def test_a_scene_of_drawn_solids_and_meshes(tmp_path):
         export(scene, tmp_path / "pair.glb", format="stl")
     with pytest.raises(InputError, match="layout parts needs a folder"):
         export(scene, tmp_path / "pair.glb", layout="parts")
+
+
+def test_final_state_is_exported_where_it_is_published(main, tmp_path):
+    code, out, err = main("export", "--format", "glb", "--output", tmp_path)
+    assert code == 0
+    assert out.split() == [str(tmp_path / "reference.glb"), str(tmp_path / "manifest-glb.json")]
+    assert "state final: nut tightened (clamped)" in err
+    listing = json.loads((tmp_path / "manifest-glb.json").read_text())
+    assert (listing["state"], listing["status"]) == ("final", "clamped")
+    assert listing["parameters"]["saddle"]["radius"] == 49.230
+    # As a reader sees it: metres, Y up; the nut's top face 67.774 mm above the line, the bolt's end 120.184 mm.
+    scene = trimesh.load(tmp_path / "reference.glb")
+    assert scene.bounds[1][1] == pytest.approx(0.120184, abs=1e-6)
+
+
+def test_scenes_and_meshes_are_exported_too(main, tmp_path):
+    hinge = ROOT / "examples" / "hinge"
+    assert main("export", hinge / "scene.toml", "-o", tmp_path / "hinge.3mf")[0] == 0
+    meshes = [trimesh.load(hinge / f"{name}.stl") for name in ("leaf-a", "leaf-b", "pin")]
+    expected = trimesh.util.concatenate(meshes).bounds
+    assert trimesh.load(tmp_path / "hinge.3mf").bounds == pytest.approx(expected, abs=1e-5)
+    assert main("export", hinge / "pin.stl", "-f", "obj", "-o", tmp_path / "pin")[0] == 0
+    assert (tmp_path / "pin" / "pin.obj").is_file()
+    assert main("export", ROOT / "examples/v-block/scene.toml", "--clashes", "-o", tmp_path / "all.glb")[0] == 0
+    assert [n for n in trimesh.load(tmp_path / "all.glb").graph.nodes_geometry if n.startswith("clash ")]
+    assert main("export", "--clashes", "-q", "--output", tmp_path / "clamp.glb")[0] == 2  # a clamp has none to give
+    assert not (tmp_path / "clamp.glb").exists()
+    _, out, _ = main("export", "-o", tmp_path / "final.step", "-q")
+    assert out.split() == [str(tmp_path / f"final.step{s}") for s in ("", ".manifest.json")]
+
+
+def test_review_set_is_what_a_new_build_gives():
+    done = python("scripts/build-meshes", "--check")
+    assert (done.stdout, done.returncode) == ("", 0), done.stderr
+
+
+def test_an_order_of_assembly_is_exported_as_it_stands_after_a_step(main, tmp_path):
+    """The jumper is in its groove, the saddle on the bolt still waits below."""
+    order = ("--sequence", "P1 -> P7 -> P2 -> P3|P4 -> P5")
+    assert main("export", "-f", "glb", "-o", tmp_path / "a", *order, "--state", "P7")[0] == 0
+    listing = json.loads((tmp_path / "a" / "manifest-glb.json").read_text())
+    place = {name: np.array(listing["parts"][name]["T_world_part"])[:3, 3] for name in PARTS}
+    assert abs(place["P7"][0] - place["P1"][0]) < 137.0
+    assert place["P3"][2] < place["P1"][2] - 150.0
+    assert main("export", "-f", "stl", "-o", tmp_path / "c", *order)[0] == 2

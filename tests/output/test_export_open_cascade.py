@@ -16,9 +16,8 @@ from clamp3d.output.palette import PART_COLOURS
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from OCP.BRep import BRep_Tool
 
-from clamp3d.files.open_cascade import explore
+from clamp3d.files.open_cascade import explore, occ
 from tests.cad import bounds
 from tests.output.step_reader import read_step
 
@@ -51,7 +50,7 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference, tmp_p
     for name, path in zip(PARTS, written.files, strict=True):
         (product,) = read_step(path)
         assert product.path == (f"{name} {TITLES[name]}",)
-        kinds = [BRep_Tool.Surface_s(face) for face in explore(product.shape, "FACE")]
+        kinds = [occ.BRep_Tool.Surface_s(face) for face in explore(product.shape, "FACE")]
         assert {type(surface).__name__ for surface in kinds} <= {"Geom_Plane", "Geom_CylindricalSurface"}
         radii[name] = Counter(round(s.Radius(), 9) for s in kinds if type(s).__name__ == "Geom_CylindricalSurface")
     assert radii == {

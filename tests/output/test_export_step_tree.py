@@ -6,16 +6,11 @@ import trimesh
 
 pytest.importorskip("OCP")
 
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-from OCP.Quantity import Quantity_Color
-from OCP.TCollection import TCollection_ExtendedString
-from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
-from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from clamp3d import check, export, load
+from clamp3d.files.open_cascade import occ
 from clamp3d.kernel import translation
-from tests.cad import Tree, random_pose
+from tests.cad import Tree, block, random_pose
 from tests.files.step_scenes import pin, plate
 from tests.output.step_reader import children, read_step
 
@@ -36,19 +31,19 @@ def by_name(path):
 def coloured(path):
     """Two uses of a sub-assembly, a pin in four places, one of them blue; the plate has no colour, but a red face."""
     tree = Tree()
-    colours = XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main())
+    colours = occ.XCAFDoc_DocumentTool.ColorTool_s(tree.document.Main())
 
     def paint(label, hexadecimal):
-        colour = Quantity_Color()
-        Quantity_Color.ColorFromHex_s(hexadecimal, colour)
-        colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorGen)
+        colour = occ.Quantity_Color()
+        occ.Quantity_Color.ColorFromHex_s(hexadecimal, colour)
+        colours.SetColor(label, colour, occ.XCAFDoc_ColorType.XCAFDoc_ColorGen)
 
     rng = np.random.default_rng(8)
     root, sub = tree.product("machine"), tree.product("sub, assembly")
     body = plate()
     plates, pins = tree.product("plate", body), tree.product("pin", pin())
     paint(pins, GREEN)
-    paint(tree.tool.AddSubShape(plates, TopExp_Explorer(body, TopAbs_ShapeEnum.TopAbs_FACE).Current()), RED)
+    paint(tree.tool.AddSubShape(plates, occ.TopExp_Explorer(body, occ.TopAbs_ShapeEnum.TopAbs_FACE).Current()), RED)
     tree.put(sub, plates, random_pose(rng), "plate")
     tree.put(sub, pins, random_pose(rng), "pin")
     tree.put(root, sub, random_pose(rng), "left")
@@ -56,8 +51,8 @@ def coloured(path):
     tree.put(root, pins, random_pose(rng), "loose")
     tree.put(root, pins, random_pose(rng), "blue one")
     paint(list(children(root))[-1], BLUE)
-    layers = XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main())
-    layers.SetLayer(plates, TCollection_ExtendedString("outer"))
+    layers = occ.XCAFDoc_DocumentTool.LayerTool_s(tree.document.Main())
+    layers.SetLayer(plates, occ.TCollection_ExtendedString("outer"))
     return tree.write(path)
 
 
@@ -118,7 +113,7 @@ def test_equal_solids_of_two_products_and_solids_of_one_keep_their_names(tmp_pat
     tree = Tree()
     root = tree.product("pads")
     for k, name in enumerate(("left pad", "right pad")):
-        tree.put(root, tree.product(name, BRepPrimAPI_MakeBox(1.0, 2.0, 3.0).Shape()), translation(5 * k, 0, 0), "pad")
+        tree.put(root, tree.product(name, block((0, 0, 0), (1, 2, 3))), translation(5 * k, 0, 0), "pad")
     scene = load(tree.write(tmp_path / "pads.step"))
     again = by_name(export(scene, tmp_path / "again.step").files[0])
     assert {name: leaf.path for name, leaf in again.items()} == {

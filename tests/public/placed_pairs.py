@@ -11,22 +11,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from OCP.BRepBuilderAPI import (
-    BRepBuilderAPI_Copy,
-    BRepBuilderAPI_MakeEdge,
-    BRepBuilderAPI_MakeFace,
-    BRepBuilderAPI_MakePolygon,
-    BRepBuilderAPI_MakeWire,
-    BRepBuilderAPI_NurbsConvert,
-)
-from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
-from OCP.Geom import Geom_BezierCurve
-from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Vec
-from OCP.TopLoc import TopLoc_Location
 
+from clamp3d.files.open_cascade import occ
 from tests.cad import (
     Tree,
+    array_of,
     ball,
     block,
     bounds,
@@ -55,41 +44,34 @@ OVERLAPS = frozenset({"clash", "contained", "duplicate"})
 
 def hexagon(apothem, low, high):
     """A hexagonal prism with two faces square to y."""
-    polygon = BRepBuilderAPI_MakePolygon()
+    polygon = occ.BRepBuilderAPI_MakePolygon()
     for k in range(6):
         angle, far = math.pi * k / 3, apothem / math.cos(math.pi / 6)
-        polygon.Add(gp_Pnt(far * math.cos(angle), far * math.sin(angle), low))
+        polygon.Add(occ.gp_Pnt(far * math.cos(angle), far * math.sin(angle), low))
     polygon.Close()
-    face = BRepBuilderAPI_MakeFace(polygon.Wire()).Face()
-    return BRepPrimAPI_MakePrism(face, gp_Vec(0, 0, high - low)).Shape()
+    face = occ.BRepBuilderAPI_MakeFace(polygon.Wire()).Face()
+    return occ.BRepPrimAPI_MakePrism(face, occ.gp_Vec(0, 0, high - low)).Shape()
 
 
 def arch(half_width, height, length):
     """A prism along y under a Bezier curve whose highest point is (0, y, height)."""
-    ends = [gp_Pnt(s * half_width, -length / 2, 0) for s in (-1, 1)]
-    poles = ends[0], gp_Pnt(0, -length / 2, 2 * height), ends[1]
-    return BRepPrimAPI_MakePrism(face_under(poles), gp_Vec(0, length, 0)).Shape()
+    ends = [occ.gp_Pnt(s * half_width, -length / 2, 0) for s in (-1, 1)]
+    poles = ends[0], occ.gp_Pnt(0, -length / 2, 2 * height), ends[1]
+    return occ.BRepPrimAPI_MakePrism(face_under(poles), occ.gp_Vec(0, length, 0)).Shape()
 
 
 def face_under(poles):
     """The face between a Bezier curve and its chord."""
-    try:
-        from OCP.collections import Array1_gp_Pnt as Points
-    except ModuleNotFoundError:
-        from OCP.TColgp import TColgp_Array1OfPnt as Points
-    array = Points(1, len(poles))
-    for k, pole in enumerate(poles, 1):
-        array.SetValue(k, pole)
-    curve = BRepBuilderAPI_MakeEdge(Geom_BezierCurve(array)).Edge()
-    chord = BRepBuilderAPI_MakeEdge(poles[-1], poles[0]).Edge()
-    return BRepBuilderAPI_MakeFace(BRepBuilderAPI_MakeWire(curve, chord).Wire()).Face()
+    curve = occ.BRepBuilderAPI_MakeEdge(occ.Geom_BezierCurve(array_of("gp_Pnt", poles))).Edge()
+    chord = occ.BRepBuilderAPI_MakeEdge(poles[-1], poles[0]).Edge()
+    return occ.BRepBuilderAPI_MakeFace(occ.BRepBuilderAPI_MakeWire(curve, chord).Wire()).Face()
 
 
 def bulge(radius, half_length):
     """A Bezier curve turned about z: its greatest radius is at z = 0."""
-    poles = gp_Pnt(0, 0, -half_length), gp_Pnt(2 * radius, 0, 0), gp_Pnt(0, 0, half_length)
-    axis = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
-    return BRepPrimAPI_MakeRevol(face_under(poles), axis).Shape()
+    poles = occ.gp_Pnt(0, 0, -half_length), occ.gp_Pnt(2 * radius, 0, 0), occ.gp_Pnt(0, 0, half_length)
+    axis = occ.gp_Ax1(occ.gp_Pnt(0, 0, 0), occ.gp_Dir(0, 0, 1))
+    return occ.BRepPrimAPI_MakeRevol(face_under(poles), axis).Shape()
 
 
 def drilled(rng, low, high, radius):
@@ -260,7 +242,7 @@ def thread():
 
     iso = IsoThread(major_diameter=10, pitch=1.5, length=6, end_finishes=("square", "square"))
     ridge = first_solid(iso.wrapped)
-    return ridge, 6.0 - BRepExtrema_DistShapeShape(ridge, cut(rod(8, -4, 12), rod(6.0, -5, 13))).Value()
+    return ridge, 6.0 - occ.BRepExtrema_DistShapeShape(ridge, cut(rod(8, -4, 12), rod(6.0, -5, 13))).Value()
 
 
 def thread_in_tube(rng, gap):
@@ -310,7 +292,7 @@ SOLIDS = {
 def duplicate(rng, gap, kind=None):
     """One solid twice, ``|gap|`` apart along some direction: an overlap however small the way between them."""
     shape, way = SOLIDS[kind or rng.choice(list(SOLIDS))](rng), rng.normal(size=3)
-    return shape, shape.Located(TopLoc_Location(transformation(shift(*(abs(gap) * way / np.linalg.norm(way))))))
+    return shape, shape.Located(occ.TopLoc_Location(transformation(shift(*(abs(gap) * way / np.linalg.norm(way))))))
 
 
 def contained(rng, gap):
@@ -369,7 +351,7 @@ def placed_pair(family, rng, gap=None, splines=0.1):
     gap = draw_gap(rng, family) if gap is None else gap
     a, b = FAMILIES[family](rng, gap)
     if family not in ("duplicate", "thread_in_tube") and splines:
-        a, b = (BRepBuilderAPI_NurbsConvert(x, True).Shape() if rng.random() < splines else x for x in (a, b))
+        a, b = (occ.BRepBuilderAPI_NurbsConvert(x, True).Shape() if rng.random() < splines else x for x in (a, b))
     return PlacedPair(family, a, b, gap)
 
 
@@ -392,7 +374,7 @@ def write_pairs(pairs, path, rng):
             tree.put(root, shared, T @ matrix(pair.b.Location()))
         else:
             for name, shape in (("a", pair.a), ("b", pair.b)):
-                tree.put(root, tree.product(f"{name}{k}", first_solid(BRepBuilderAPI_Copy(shape).Shape())), T)
+                tree.put(root, tree.product(f"{name}{k}", first_solid(occ.BRepBuilderAPI_Copy(shape).Shape())), T)
     return tree.write(path)
 
 

@@ -1,13 +1,17 @@
-"""Signed distances of drawn bodies against formulas, and against Open CASCADE at random poses."""
+"""Signed distances of drawn bodies against formulas and Open CASCADE, of meshes against manifold3d."""
 
+import itertools
 import math
 
+import manifold3d
 import numpy as np
 import pytest
+import trimesh
 
-from clamp3d import Scene, check, distance
+from clamp3d import distance
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
+from tests.kinds import mesh_shape, row_of
 
 HALF = math.radians(60.0)
 BLOCK = groove_block(SweptArc(7.0, HALF, 50.0), 40.0, 20.0)  # its face is at y = -3.5
@@ -100,8 +104,8 @@ def test_depths_of_bodies_that_overlap(case):
 def test_a_wire_at_the_edge_of_contact_is_decided():
     for depth, expected in ((0.0101, "clash"), (0.0099, "contact")):
         for turn in (np.eye(4), QUARTER):
-            scene = Scene().add("a", cylinder(5, 40)).add("b", cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
-            assert check(scene).verdict("a", "b").value == expected
+            row = row_of(cylinder(5, 40), cylinder(3, 40), translation(8 - depth, 0, 0) @ turn)
+            assert row.verdict.value == expected
 
 
 # --- Open CASCADE -----------------------------------------------------------------------------------------------------
@@ -121,10 +125,9 @@ PAIRS = ["box-cylinder", "cylinder-cylinder", "tube-box", "tube-cylinder", "plat
 @pytest.mark.parametrize("pair", PAIRS)
 def test_random_poses_as_open_cascade_measures_them(pair):
     pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
     from clamp3d.output.step import solid
-    from tests.cad import common_volume, moved, random_pose
+    from tests.cad import common_volume, moved, occ, random_pose
 
     one, two = (BODIES[name] for name in pair.split("-"))
     rng = np.random.default_rng(len(pair))
@@ -132,7 +135,7 @@ def test_random_poses_as_open_cascade_measures_them(pair):
     for k in range(10):
         T = random_pose(rng, 6.0 if k % 2 else 14.0)
         a, b = solid(one), moved(solid(two), T)
-        truth, measured = BRepExtrema_DistShapeShape(a, b).Value(), distance(one, two, T)
+        truth, measured = occ.BRepExtrema_DistShapeShape(a, b).Value(), distance(one, two, T)
         seen.add(truth > 0.0)
         if truth > 0.0:
             exactly(truth, measured, 2e-6)
@@ -140,8 +143,55 @@ def test_random_poses_as_open_cascade_measures_them(pair):
             assert measured.upper < 0.0
             for way in rng.normal(size=(4, 3)):  # no shorter translation parts them
                 near = moved(b, translation(*(0.99 * -measured.upper * way / np.linalg.norm(way))))
-                assert BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
+                assert occ.BRepExtrema_DistShapeShape(a, near).Value() < 1e-9
             if measured.normal is not None and math.isfinite(measured.lower):
                 free = moved(b, translation(*(-measured.lower * measured.normal)))
                 assert common_volume(a, free) < 1e-4
     assert seen == {True, False}
+
+
+SKEW = rotation((1.0, 2.0, 3.0), 0.7)
+MADE = {
+    "icosphere": trimesh.creation.icosphere(3, 10.0),
+    "cylinder": trimesh.creation.cylinder(6.0, 20.0, sections=48),
+    "box": trimesh.creation.box((12.0, 10.0, 8.0)),
+    "torus": trimesh.creation.torus(10.0, 3.0, 48, 24),
+}
+
+
+def manifold(mesh, T=None):
+    vertices = trimesh.transform_points(mesh.vertices, np.eye(4) if T is None else T)
+    raw = manifold3d.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(mesh.faces, dtype=np.uint64))
+    return manifold3d.Manifold(raw)
+
+
+def placed(rng, reach):
+    T = rotation(rng.normal(size=3), rng.uniform(0, 3))
+    way = rng.normal(size=3)
+    T[:3, 3] = reach * way / np.linalg.norm(way)
+    return T
+
+
+@pytest.mark.parametrize(("a", "b"), [*itertools.combinations_with_replacement(MADE, 2)])
+def test_gaps_and_common_volumes_as_manifold_measures_them(a, b):
+    rng = np.random.default_rng(0)
+    for reach in (9.0, 14.0, 22.0):
+        T = placed(rng, reach)
+        one, two = manifold(MADE[a]), manifold(MADE[b], T)
+        volume, row = (one ^ two).volume(), row_of(mesh_shape(MADE[a]), mesh_shape(MADE[b]), T, clearance=30.0)
+        if volume > 0.1:
+            assert row.verdict.value in ("clash", "contained")
+            low, high = row.where.volume
+            assert low * 0.999 - 1e-6 <= volume <= high * 1.001 + 1e-6
+        elif volume == 0.0:
+            measured = distance(mesh_shape(MADE[a]), mesh_shape(MADE[b]), T)
+            gap = one.min_gap(two, 60.0)
+            assert measured.lower - 1e-6 <= gap <= measured.upper + 1e-6
+            assert measured.upper - measured.lower < 1e-4
+
+
+@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("offset", [0.0, 0.005])
+def test_one_mesh_twice_is_an_overlap(name, offset):
+    shape = mesh_shape(MADE[name])
+    assert row_of(shape, shape, translation(offset, 0, 0) @ SKEW).verdict.value in ("duplicate", "contained", "clash")

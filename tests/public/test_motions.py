@@ -99,15 +99,14 @@ def plate_and_pin(tmp_path_factory):
     from tests.cad import block, cut, location, rod
     from tests.files.assemblies import write_step
 
-    path = tmp_path_factory.mktemp("cad") / "pin.step"
     plate = cut(block((-15, -15, -3), (15, 15, 3)), rod(4.1, -4, 4))
-    write_step({"plate": plate, "pin": rod(4.0, 0, 20).Located(location(translation(0, 0, 10)))}, path)
-    return {part.name: part for part in load(path).parts}
+    parts = {"plate": plate, "pin": rod(4.0, 0, 20).Located(location(translation(0, 0, 10)))}
+    return load(write_step(parts, tmp_path_factory.mktemp("cad") / "pin.step")).parts
 
 
 @pytest.mark.parametrize("aside", [0.0, 0.05])
 def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
-    plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
+    plate, pin = plate_and_pin
     start = translation(aside, 0, 0) @ pin.T_world
     least = min_clearance(plate.shape, pin.shape, down(20.0), start)
     assert least.distance.lower - 1e-9 <= 0.1 - aside <= least.distance.upper + 1e-9
@@ -120,18 +119,17 @@ def test_a_round_side_of_cad_leaves_a_plate(tmp_path):
     from tests.cad import block, rod
     from tests.files.assemblies import write_step
 
-    plate, bar = block((-40, -40, -3), (40, 40, 0)), rod(8.0, -6, 6)
-    path = write_step({"plate": plate, "bar": bar}, tmp_path / "over.step")
-    parts = {part.name: part for part in load(path).parts}
+    parts = {"plate": block((-40, -40, -3), (40, 40, 0)), "bar": rod(8.0, -6, 6)}
+    plate, bar = load(write_step(parts, tmp_path / "over.step")).parts
     start = pose((1.0, 0.0, 0.0), math.pi / 2, (-10.0, 0.0, 8.05))
-    least = min_clearance(parts["plate"].shape, parts["bar"].shape, Motion.translate((20, 0, 20)), start)
+    least = min_clearance(plate.shape, bar.shape, Motion.translate((20, 0, 20)), start)
     assert least.distance.lower - 1e-6 <= 0.05 <= least.distance.upper + 1e-6
     assert not least.touches
 
 
 @pytest.mark.parametrize(("aside", "t"), [(0.3, (10 - 3) / 20), (9.0, (10 - 3) / 20)])
 def test_a_pin_of_cad_beside_its_hole_meets_the_plate(plate_and_pin, aside, t):
-    plate, pin = plate_and_pin["plate"], plate_and_pin["pin"]
+    plate, pin = plate_and_pin
     hit = first_contact(plate.shape, pin.shape, down(20.0), translation(aside, 0, 0) @ pin.T_world)
     assert hit.touches
     assert t - 0.001 <= hit.t <= t + 1e-9

@@ -5,7 +5,6 @@ import json
 import math
 import re
 import sys
-from pathlib import Path
 
 import pytest
 from claims import END, START, assembly_table, comparison_table, update
@@ -25,6 +24,7 @@ from clamp3d.bench.compare.run import LIBRARIES, Comparison, NotMeasured, compar
 from clamp3d.bench.compare.scene import chord_error
 from clamp3d.bench.machine import machine
 from clamp3d.cli.bench import Compare
+from tests.docs.project import ROOT
 
 QUICK = 0.01
 
@@ -32,9 +32,7 @@ QUICK = 0.01
 def _row(method, one, worst, setting=None):
     bands = tuple(Band(b, 40, 40, 0, 0) for b in (0.02, 1e-4, 1e-6))
     label = Method(method, setting).label
-    return Measured(
-        method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2
-    )  # fmt: skip
+    return Measured(method, setting, label, 1, 420, worst / 2, worst, None, bands, 0.1, 0.01, one, one / 2)
 
 
 def test_cas_is_exact_to_rounding_and_never_wrong():
@@ -113,18 +111,17 @@ def test_every_series_measures_the_same_groove(family):
 
 
 def test_pages_say_what_the_figures_say(tmp_path):
-    root = Path(__file__).parents[3]
-    data = json.loads((root / "docs" / "compare.json").read_text())
+    data = json.loads((ROOT / "docs" / "compare.json").read_text())
     for page in ("README.md", "docs/methods.md"):
-        assert comparison_table(data) in (root / page).read_text(), f"{page}: run scripts/make-figures"
-    assert assembly_table(data) in (root / "docs" / "reproduction.md").read_text(), "run scripts/make-figures"
+        assert comparison_table(data) in (ROOT / page).read_text(), f"{page}: run scripts/make-figures"
+    assert assembly_table(data) in (ROOT / "docs" / "reproduction.md").read_text(), "run scripts/make-figures"
     assert "clamp3d, closed form" in comparison_table(data).splitlines()[2]
     page = tmp_path / "page.md"
     page.write_text(f"before\n{START}\nold\n{END}\nafter\n")
     update(page, comparison_table(data))
     assert page.read_text() == f"before\n{START}\n{comparison_table(data)}\n{END}\nafter\n"
     with pytest.raises(InputError, match="must have the marks"):
-        update(root / "LICENSE", "")
+        update(ROOT / "LICENSE", "")
 
 
 def _comparison():
