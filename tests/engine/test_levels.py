@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Scene, Verdict, check, distance, shapes
@@ -232,11 +232,23 @@ def test_large_convex_meshes_are_asked_as_meshes_and_their_depth_is_found():
     assert row.distance.upper - row.distance.lower <= 0.01
 
 
+def test_triangles_with_parallel_sides_are_as_far_apart_as_their_planes():
+    """FCL stops at some of these pairs of sides."""
+    floor = Surface(
+        np.array([[-20.0, -25, 0], [20, -25, 0], [20, 25, 0], [-20, 25, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    )
+    rng = np.random.default_rng(0)
+    for leg, x, y in rng.uniform([1.0, -14.0, -14.0], [5.0, 9.0, 14.0], (300, 3)):
+        corner = Surface(np.array([[0.0, -leg, 0], [0, leg, 0], [1, leg, 0]]), np.array([[0, 1, 2]]))
+        assert nearest_points(floor, corner, translation(x, y, 3.5))[0] == pytest.approx(3.5, abs=1e-9)
+
+
 # --- Cylinders on facets ----------------------------------------------------------------------------------------------
 
 
 @QUICK
 @given(SOME, st.floats(0.5, 6.0), st.floats(2.0, 40.0), poses(22.0))
+@example(0, 4.0, 5.535025103436983, translation(7, 0, 0))
 def test_a_cylinder_on_facets(i, radius, length, T):
     """A lower bound against samples of both surfaces, an upper one against the cylinder's own definition."""
     mesh, rod = surface(FACETED[i]), shapes.cylinder(radius, length)
