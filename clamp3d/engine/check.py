@@ -217,7 +217,7 @@ class _Questions:
                 self._answers[key] = self._answer(a, b, T, start, allowance)
             verdict, distance = self._answers[key]
             if depth and (*key, depth) not in self._answers:
-                self._answers[*key, depth] = verdict, penetration(a, b, T, distance, fine=self.distances)
+                self._answers[*key, depth] = verdict, penetration(a, b, T, distance)
         except MissingLibraryError:
             raise
         except Exception as error:  # one pair that fails is a finding, not the end of all others

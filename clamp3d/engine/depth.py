@@ -6,6 +6,7 @@ the other, and at most as long as a translation after which the bodies are verif
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,14 +37,14 @@ LONG = 3.0
 """Ratio of a way out to the interference from which on that is bounded by itself: how far a pin is to be moved out of
 its hole says nothing of how much it is too thick.
 """
-_SHARE = 0.02
-"""Chords of the border of a common part, of its thickness, where no distances are asked for: two digits are certain."""
 _SHARP = 1.1
 """Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
-QUICK_CHORD = 0.005
-"""Chord error (mm) for depths of solids from CAD where no distances are asked for: half the usual contact threshold."""
-_SMALL = 0.02
-"""Ratio of a coarse mesh's error to a depth up to which that is not measured on a finer one, but for `fine`."""
+_CHORD = 0.005
+"""Chord error (mm) of the finer meshes for depths of solids from CAD: half the usual contact threshold."""
+_STEADY = 10.0
+"""Ratio of a way out to what meshes hide from which on finer ones shorten it by no more than a fifth."""
+_TIGHT = 1.01
+"""Ratio of a way out to the depth of a point at which finer meshes are not tried."""
 _CLOSE = 1.05
 """Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
@@ -67,7 +68,7 @@ def depth_of_pieces(a: Model, b: Model, T: Array) -> Distance | None:
     return distance if distance.upper <= 0.0 else None
 
 
-def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool = True) -> Distance:
+def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
     """The signed distance of two overlapping bodies with bounds of the depth in place of the interference.
 
     Parameters
@@ -76,8 +77,6 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
         The bodies, b placed by ``T`` (4, 4) in a's frame.
     distance : Distance
         What `refine` says of them; returned as it is where they are apart.
-    fine : bool
-        Measure solids from CAD on their finest meshes; else on those of `QUICK_CHORD`.
 
     Returns
     -------
@@ -94,24 +93,27 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, fine: bool 
     if exact is not None:
         upper = max(exact.lower, min(exact.upper, distance.upper))
         return replace(exact, upper=upper, interference=(depth, at_most), level=distance.level)
-    meshes = _overlapping_meshes(a, b, T, depth, fine)
-    if meshes is None:
+    way = None
+    for meshes in _overlapping_meshes(a, b, T):
+        new = _way_out(a, b, meshes, depth)
+        way = new if way is None or new.lower > way.lower else way
+        depth, is_long = -new.upper, _is_long(way, meshes)
+        if -way.lower <= _TIGHT * depth or -way.lower >= _STEADY * meshes.hidden:
+            break
+    if way is None:
         return replace(distance, lower=-np.inf, interference=(depth, at_most))
-    if not (a.bracketed or b.bracketed):  # meshes around drawn bodies attest no depth
-        depth = max(depth, deepest(*meshes)[0])
-    length, direction = _way_out(meshes, depth)
     method = distance.method
-    if length > LONG * (depth + meshes.hidden):
-        own = _interference(a, b, meshes, fine)
+    if is_long:
+        own = _interference(a, b, T)
         depth, at_most, method = max(depth, -own.upper), min(at_most, -own.lower), own.method or method
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     return replace(
         distance,
-        lower=min(-length, upper),
+        lower=min(way.lower, upper),
         upper=upper,
-        interference=(depth, max(depth, min(at_most, length))),  # no point is deeper than the bodies
-        normal=direction,
-        method=f"{method}; separating move by meshes (FCL)",
+        interference=(depth, max(depth, min(at_most, -way.lower))),  # no point is deeper than the bodies
+        normal=way.normal,
+        method=f"{method}; separating move by {way.method}",
     )
 
 
@@ -129,24 +131,48 @@ class _OverlappingMeshes(NamedTuple):
         return self.a.error + self.b.error
 
 
-def _overlapping_meshes(a: Model, b: Model, T: Array, depth: float, fine: bool) -> _OverlappingMeshes | None:
-    """The meshes that an overlap of at least ``depth`` mm is measured on; None if there are none, or they are apart."""
+def _overlapping_meshes(a: Model, b: Model, T: Array) -> Iterator[_OverlappingMeshes]:
+    """Meshes of two bodies that overlap, coarse ones of solids from CAD first; none where they are apart."""
     if not (a.chords and b.chords):
-        return None
-    outer_a, outer_b = (_depth_mesh(model, depth, fine) for model in (a, b))
-    shared = common(outer_a, outer_b, T)
-    return None if shared is None else _OverlappingMeshes(outer_a, outer_b, T, shared)
+        return
+    for mesh_of in (_coarse_mesh, _fine_mesh) if a.exact is not None and b.exact is not None else (_fine_mesh,):
+        outer_a, outer_b = mesh_of(a), mesh_of(b)
+        shared = common(outer_a, outer_b, T)
+        if shared is not None:
+            yield _OverlappingMeshes(outer_a, outer_b, T, shared)
+        if outer_a.error + outer_b.error <= _EXACT:  # finer ones are the same
+            return
 
 
-def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, fine: bool) -> Distance:
-    """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the meshes."""
+def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Distance:
+    """Minus the length of a translation along ``normal`` that parts two bodies, and minus a depth that a point has."""
+    if not (a.bracketed or b.bracketed):  # meshes around drawn bodies attest no depth
+        depth = max(depth, deepest(*meshes)[0])
+    length, direction = _way_by_meshes(meshes, depth)
+    way = Distance(-length, -depth, normal=direction, method="meshes (FCL)")
+    if a.exact is None or b.exact is None or _is_long(way, meshes):
+        return way
+    from clamp3d.engine.exact import exact_way_out
+
+    shorter = exact_way_out(a, b, meshes.T, length * direction)
+    upper = max(min(way.upper, shorter.upper), shorter.lower)
+    return replace(shorter if shorter.lower > way.lower else way, upper=upper)
+
+
+def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:
+    return -way.lower > LONG * (meshes.hidden - way.upper)
+
+
+def _interference(a: Model, b: Model, T: Array) -> Distance:
+    """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the finest meshes."""
     own = Distance()
     if a.exact is not None and b.exact is not None:
         from clamp3d.engine.exact import exact_overlap
 
-        own = exact_overlap(a, b, meshes.T, SHARES[1] if fine else _SHARE)
+        own = exact_overlap(a, b, T, SHARES[1])
     if np.isfinite(own.lower):
         return own
+    *_, meshes = _overlapping_meshes(a, b, T)
     return replace(own, lower=-meshes.hidden - thickness(*meshes, _is_sharp, FEW_CUTS), method="")
 
 
@@ -154,18 +180,20 @@ def _is_sharp(bound: float, reached: float) -> bool:
     return bound <= _SHARP * reached
 
 
-def _depth_mesh(model: Model, depth: float, fine: bool) -> Surface:
-    """The mesh that a depth of at least ``depth`` mm is measured on: the coarse one where finer ones take too long."""
-    coarse, finest = model.outer(model.chords[0]), model.chords[min(1, len(model.chords) - 1)]
-    if model.exact is not None and coarse.error <= (0.0 if fine else _SMALL * depth):
-        return coarse
+def _coarse_mesh(model: Model) -> Surface:
+    return model.outer(model.chords[0])
+
+
+def _fine_mesh(model: Model) -> Surface:
+    """The mesh that a depth is measured on: the coarse one where finer ones take too long."""
+    finest = model.chords[min(1, len(model.chords) - 1)]
     try:
-        return model.outer(finest if fine or model.exact is None else max(finest, QUICK_CHORD))
+        return model.outer(finest if model.exact is None else max(finest, _CHORD))
     except Clamp3dError:
-        return coarse
+        return _coarse_mesh(model)
 
 
-def _way_out(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:
+def _way_by_meshes(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:
     """Length (mm) and direction (3,) of a translation of ``b`` after which meshes are apart."""
     a, b, T, shared = meshes
     off = a.error + b.error + rounding_of(a, b, T)

@@ -76,6 +76,23 @@ def _attested(points: Array, depths: Array) -> Distance:
     return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
 
 
+def exact_way_out(a: Model, b: Model, T: Array, way: Array) -> Distance:
+    """Bounds of minus the depth: ``lower`` by a translation that parts the solids, along ``normal``.
+
+    ``way`` (3,) parts them too. Lemma: solids that keep a gap after a translation are also apart after one that is
+    shorter by as much, since no point moves by more. The points that are nearest after it are about as deep before.
+    """
+    moved = T.copy()
+    moved[:3, 3] += way
+    gap = exact_distance(a, b, moved)
+    if gap.normal is None or gap.point_a is None or gap.point_b is None:  # they touch, or no gap is certain
+        return Distance()
+    length = float(np.linalg.norm(way))
+    points = np.stack([gap.point_a, gap.point_b - way])
+    attested = min(0.0, _attested(points, _depths(a, b, T, points)).upper)
+    return Distance(gap.lower - length, attested, normal=way / length, method=METHOD)
+
+
 def exact_overlap(
     a: Model, b: Model, T: Array, share: float, *, quick: bool = False, attested: float = 0.0
 ) -> Distance:

@@ -23,7 +23,7 @@ from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import to_target
-from tests.cad import ball, block, cone, cut, first_solid, moved, ring, rod, shift, turn
+from tests.cad import ball, block, common_volume, cone, cut, first_solid, moved, ring, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -56,7 +56,7 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     if not found:
         monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
     a, b = models(family, -0.04)
-    distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.02), fine=False)
+    distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.02))
     least, most = distance.interference
     assert 0.035 < least <= 0.04 <= most  # points attest it exactly, also where no common part is found
     assert -distance.lower > 0.5
@@ -64,13 +64,24 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
 
 
-@pytest.mark.parametrize(("gap", "meshes"), [(-8.0, 2), (-0.5, 3)])
-def test_a_deep_overlap_is_measured_on_coarse_meshes(gap, meshes):
-    a, b = models_of(ball(12.0), moved(ball(12.0), shift(24.0 + gap)))
-    distance = penetration(a, b, np.eye(4), refine(a, b, np.eye(4), Distance(), lambda d: d.upper < 0.0), fine=False)
-    assert distance.lower <= gap <= distance.upper
-    assert distance.lower >= 1.15 * gap
-    assert a.counters.built["meshes"] == b.counters.built["meshes"] == meshes  # one of them to see that it is no hull
+@pytest.mark.parametrize("gap", [-8.0, -0.5])
+def test_a_deep_overlap_is_measured_on_coarse_meshes(gap):
+    solids = (ball(12.0), moved(ball(12.0), shift(24.0 + gap)))
+    a, b = (model_of(BrepSolid.of(solid, "x"), Counters()) for solid in solids)
+    penetration(a, b, np.eye(4), refine(a, b, np.eye(4), Distance(), lambda d: d.upper < 0.0))
+    assert a.counters.built["meshes"] == b.counters.built["meshes"] == 2
+
+
+@pytest.mark.parametrize("gap", [-0.03, -0.7])
+@pytest.mark.parametrize("family", ["balls", "ball_on_plate", "rods_crossed", "box_on_its_corner"])
+def test_a_depth_is_that_of_the_formula_and_its_translation_parts_the_solids(family, gap):
+    pair = placed_pair(family, np.random.default_rng(4), gap, splines=0.0)
+    a, b = (model_of(BrepSolid.of(solid, "x"), Counters()) for solid in (pair.a, pair.b))
+    distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.01))
+    assert distance.lower - 2e-6 <= gap <= distance.upper + 2e-6
+    assert distance.upper - distance.lower <= 0.01 * -gap
+    way = (1e-5 - distance.lower) * distance.normal
+    assert common_volume(pair.a, moved(pair.b, shift(*way))) == 0.0
 
 
 def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
@@ -79,7 +90,7 @@ def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
     plate = cut(block((-20, -20, -5), (20, 20, 5)), block((-8, -8, -6), (8, 8, 6)))
     a, b = models_of(plate, rod(8.04, -9, 9))
     for angle in (0.01, 0.03, 0.05):
-        least, most = penetration(a, b, turn((0, 0, 1), angle), Distance(), fine=False).interference
+        least, most = penetration(a, b, turn((0, 0, 1), angle), Distance()).interference
         assert least <= 0.04 <= most < 0.06
 
 
