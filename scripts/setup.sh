@@ -3,6 +3,8 @@
 # PYTHON is the Python to take, VENV another folder than .venv, CONSTRAINTS a file of versions for pip, UPGRADE=1 takes
 # the newest versions of everything.
 VENV="${VENV:-.venv}"
+# Tests start hundreds of processes: each would compile anew what it imports, which takes longer than most of them.
+unset PYTHONDONTWRITEBYTECODE
 
 # Installs packages of Debian and Ubuntu; fails where this is another system, or nobody may.
 apt_install() {
