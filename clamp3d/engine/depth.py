@@ -113,7 +113,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
         upper=upper,
         interference=(depth, max(depth, min(at_most, -way.lower))),  # no point is deeper than the bodies
         normal=way.normal,
-        method=f"{method}; separating move by {way.method}",
+        method=method if method == way.method else f"{method}; separating move by {way.method}",
     )
 
 

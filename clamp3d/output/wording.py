@@ -20,8 +20,12 @@ if TYPE_CHECKING:
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
     """The signed distance between two bounds (mm) as a gap or an overlap, with no digit that is not certain.
 
+    One number if two of its digits are, else both bounds.
+
     >>> gap_text(-0.0707106782, -0.0707106781), gap_text(-110.0, -56.2341), gap_text(0.13352, 0.2)
     ('overlap 0.070711 mm', 'overlap 56.23 to 110 mm', 'gap 0.1335 to 0.2 mm')
+    >>> gap_text(0.2439, 0.2441), gap_text(0.2399, 0.2451)
+    ('gap 0.244 mm', 'gap 0.2399 to 0.2451 mm')
     >>> gap_text(-math.inf, -7.7512), gap_text(2.5, math.inf), gap_text(-math.inf, 0.25)
     ('overlap at least 7.751 mm', 'gap at least 2.5 mm', 'gap at most 0.25 mm')
     >>> gap_text(0.0, 0.0), gap_text(-0.02, 0.003)
@@ -30,7 +34,8 @@ def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
     if math.isfinite(lower) and math.isfinite(upper):
         for places in range(digits, 0, -1):
             low, high = round(lower, places) + 0.0, round(upper, places) + 0.0
-            if low == high and (high != 0.0 or places == digits or upper - lower <= 2e-6):
+            certain = abs(high) >= 10.0 ** (1 - places) or places == digits or (high == 0.0 and upper - lower <= 2e-6)
+            if low == high and certain:
                 return f"{'overlap' if high < 0.0 else 'gap'} {abs(high):.{places}f} mm"
     for kind, least, most in (("overlap", -upper, -lower), ("gap", lower, upper)):
         if least > 0.0 and math.isinf(most):
