@@ -21,6 +21,7 @@ from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.refine import SHARES
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
+from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, to_target
 
 _DIRECTIONS = 4
@@ -155,8 +156,9 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Di
     from clamp3d.engine.exact import exact_way_out
 
     shorter = exact_way_out(a, b, meshes.T, length * direction)
-    upper = max(min(way.upper, shorter.upper), shorter.lower)
-    return replace(shorter if shorter.lower > way.lower else way, upper=upper)
+    if shorter.lower <= way.lower or min(shorter.upper, -depth) < shorter.lower - 2.0 * TOLERANCE:
+        return way  # no shorter, or shorter than a point is deep: then some of the gap was overlooked
+    return replace(shorter, upper=max(min(-depth, shorter.upper), shorter.lower))
 
 
 def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:

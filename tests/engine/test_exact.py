@@ -84,6 +84,19 @@ def test_a_depth_is_that_of_the_formula_and_its_translation_parts_the_solids(fam
     assert common_volume(pair.a, moved(pair.b, shift(*way))) == 0.0
 
 
+@pytest.mark.parametrize(("more", "is_least"), [(0.1, True), (0.0, False)])
+def test_a_gap_that_is_not_the_least_shortens_no_way(more, is_least, monkeypatch):
+    measure = cad_process.distance
+
+    def measured(*pair):
+        nearest = measure(*pair)
+        return nearest._replace(distance=nearest.distance + more, is_least=is_least)
+
+    monkeypatch.setattr(cad_process, "distance", measured)
+    distance = penetration(*models("balls", -0.3), np.eye(4), Distance(-np.inf, -0.01))
+    assert -0.4 <= distance.lower <= -0.3 <= distance.upper
+
+
 def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
     """A square hole meets a round pin at four lines, which lie between two corners of its facets."""
     monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
