@@ -369,11 +369,11 @@ class Profile:
         points: list[Point] = []
         for i, edge in enumerate(self.edges):
             before = self.edges[i - 1]
+            start = before.end if isinstance(before, Segment) else edge.start
             if isinstance(edge, Segment):
-                points.append(before.end if isinstance(before, Segment) else edge.start)
+                points.append(start)
                 continue
             tangents = side != "chords" and (edge.sweep > 0.0) == (side == "outer")
-            start = before.end if isinstance(before, Segment) else edge.start
             points += edge.tangents(mesh_error, start) if tangents else edge.chords(mesh_error, start)
         return np.array(points)
 
