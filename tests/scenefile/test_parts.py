@@ -130,6 +130,13 @@ def test_joint_values_that_do_not_go(robot, joints, message):
         load(robot, joints=joints)
 
 
+def test_a_joint_without_limits_turns_by_any_angle(robot):
+    limit = '<limit lower="-1" upper="2" effort="1" velocity="1"/>'
+    robot.write_text(ROBOT.replace("revolute", "continuous").replace(limit, ""))
+    rail = load(robot, joints={"turn": 5.0}).parts[1]
+    np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", 5.0).as_matrix(), atol=1e-9)
+
+
 def test_a_robot_without_one_of_its_meshes_is_refused(robot):
     (robot.parent / "rail.stl").unlink()
     with pytest.raises(InputError, match=r"3 of 4 bodies read; missing: rail \(.*rail.stl: no such file .*\)"):
