@@ -23,6 +23,9 @@ def fail(kind):
 def pid():
     return os.getpid()
 
+def ask():
+    return os.read(0, 1)
+
 def work(seconds):
     end = time.process_time() + seconds
     while time.process_time() < end:
@@ -92,6 +95,10 @@ def test_what_it_may_not_do_is_refused(worker, function, argument):
     for confined in (worker, process()):  # the second is the one that reads foreign files
         with pytest.raises(OSError, match="not allowed while a file is read"):
             confined.call(function, argument, time_limit=60.0)
+
+
+def test_who_reads_the_standard_input_there_takes_no_request(worker):
+    assert worker.call("stand_in:ask", time_limit=20.0) == b""
 
 
 def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
