@@ -103,6 +103,7 @@ def test_a_robot_with_joint_values(robot):
     assert [p.name for p in scene.parts] == ["base", "rail", "tip_1", "tip_2"]
     base, rail, ball, pin = scene.parts
     assert base.T_world.tolist() == np.eye(4).tolist()
+    assert base.shape.bounds.tolist() == [[-50.0, -50.0, -10.0], [50.0, 50.0, 10.0]]
     np.testing.assert_allclose(rail.T_world[:3, 3], [0, 0, 60], atol=1e-9)
     np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", 30, degrees=True).as_matrix(), atol=1e-9)
     assert np.ptp(rail.shape.mesh.vertices, axis=0).round(3).tolist() == [10.0, 20.0, 60.0]
