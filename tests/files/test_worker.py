@@ -98,7 +98,7 @@ def test_what_it_may_not_do_is_refused(worker, function, argument):
 
 
 def test_who_reads_the_standard_input_there_takes_no_request(worker):
-    assert worker.call("stand_in:ask", time_limit=20.0) == b""
+    assert worker.call("stand_in:ask", time_limit=60.0) == b""
 
 
 def test_modules_of_the_current_folder_are_not_imported(tmp_path, monkeypatch):
