@@ -105,7 +105,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
         return replace(distance, lower=-np.inf, interference=(depth, at_most))
     method = distance.method
     if is_long:
-        own = _interference(a, b, T)
+        own = _interference(a, b, meshes)
         depth, at_most, method = max(depth, -own.upper), min(at_most, -own.lower), own.method or method
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     return replace(
@@ -165,16 +165,16 @@ def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:
     return -way.lower > LONG * (meshes.hidden - way.upper)
 
 
-def _interference(a: Model, b: Model, T: Array) -> Distance:
+def _interference(a: Model, b: Model, meshes: _OverlappingMeshes) -> Distance:
     """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the finest meshes."""
     own = Distance()
     if a.exact is not None and b.exact is not None:
         from clamp3d.engine.exact import exact_overlap
 
-        own = exact_overlap(a, b, T, SHARES[1])
-    if np.isfinite(own.lower):
-        return own
-    *_, meshes = _overlapping_meshes(a, b, T)
+        own = exact_overlap(a, b, meshes.T, SHARES[1])
+        if np.isfinite(own.lower):
+            return own
+        *_, meshes = _overlapping_meshes(a, b, meshes.T)
     return replace(own, lower=-meshes.hidden - thickness(*meshes, _is_sharp, FEW_CUTS), method="")
 
 

@@ -153,11 +153,12 @@ def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Arra
     import fcl
 
     lower, best, points = np.inf, np.inf, (np.zeros(3), np.zeros(3))
+    turned = T @ _TURN
     for first, e in a.groups:
         for second, f in b.groups:
             answer = fcl.DistanceResult()
             request = fcl.DistanceRequest(enable_nearest_points=True)
-            d = float(fcl.distance(*fcl_pair(first, second, T @ _TURN), request, answer))
+            d = float(fcl.distance(*fcl_pair(first, second, turned), request, answer))
             lower = min(lower, d - e - f)
             if d < best:
                 p, q = answer.nearest_points
