@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -66,17 +68,24 @@ class Locator:
         """Where they overlap; None if not even meshes around them do, or one has no inside that is known."""
         if not (self.a.is_simple and self.b.is_simple):
             return None
-        both_exact = self.a.exact is not None and self.b.exact is not None
-        chords = sorted({*self.a.chords, *self.b.chords}, reverse=True) if self.a.chords and self.b.chords else []
-        overlap = None
-        for chord in chords[:1] if both_exact else chords:
-            finer = self._at(chord)
-            if finer is None:
+        best = None
+        for overlap in self._overlaps():
+            if overlap is None:
+                continue
+            best = overlap if best is None or overlap.point is not None else replace(overlap, point=best.point)
+            if best.volume[1] - best.volume[0] <= _SHARE * best.volume[1]:
                 break
-            overlap = finer
-            if finer.volume[1] - finer.volume[0] <= _SHARE * finer.volume[1]:
-                return finer
-        return (self._exact(overlap) if both_exact else None) or overlap
+        return best
+
+    def _overlaps(self) -> Iterator[Overlap | None]:
+        """Where they overlap by coarse meshes, by Open CASCADE for two solids from CAD, and by finer meshes."""
+        chords = sorted({*self.a.chords, *self.b.chords}, reverse=True) if self.a.chords and self.b.chords else []
+        if chords:
+            yield self._at(chords[0])
+        yield self._exact()
+        for chord in chords[1:]:
+            with suppress(Clamp3dError):  # of solids from CAD fine ones may take too long to make
+                yield self._at(chord)
 
     def _at(self, chord: float) -> Overlap | None:
         """From meshes of one chord error (mm)."""
@@ -100,10 +109,10 @@ class Locator:
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
         return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
 
-    def _exact(self, rough: Overlap | None) -> Overlap | None:
-        """From Open CASCADE, for two solids from CAD; None where it fails."""
-        assert self.a.exact is not None
-        assert self.b.exact is not None
+    def _exact(self) -> Overlap | None:
+        """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
+        if self.a.exact is None or self.b.exact is None:
+            return None
         from clamp3d.files.cad_process import common as exact_common
 
         try:
@@ -113,8 +122,7 @@ class Locator:
         if not shared.volume > 0.0:
             return None
         corners = to_target(self.T_a, box_corners(shared.box))
-        volume = (shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT))
-        return Overlap(volume, _box(corners), False, None if rough is None else rough.point)
+        return Overlap((shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT)), _box(corners))
 
 
 def _box(points: Array, slack: float = 0.0) -> Array:
