@@ -18,7 +18,7 @@ from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
-from clamp3d.engine.refine import SHARES
+from clamp3d.engine.refine import SHARES, from_boxes, refine
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import TOLERANCE
@@ -46,6 +46,10 @@ _STEADY = 10.0
 """Ratio of a way out to what meshes hide from which on finer ones shorten it by no more than a fifth."""
 _TIGHT = 1.01
 """Ratio of a way out to the depth of a point at which finer meshes are not tried."""
+_ADVANCES = 6
+"""How often a way out is shortened by the gap that it leaves: at 45 degrees to the faces each time by two thirds."""
+_SHORTENED = 1e-3
+"""Ratio of the width of a gap's bounds to a way out at which the gap that it leaves is measured no further."""
 _CLOSE = 1.05
 """Ratio of a way out, less what meshes are off by, to the depth of a point at which no shorter one is looked for."""
 
@@ -119,46 +123,83 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
 
 
 class _OverlappingMeshes(NamedTuple):
-    """Meshes of two bodies, ``b`` placed by ``T`` (4, 4) in a's frame, and their common part."""
+    """Meshes of two bodies, ``b`` placed by ``T`` (4, 4) in a's frame, and their common part.
+
+    ``hidden`` (mm): how much less than theirs the depth of the bodies may be.
+    """
 
     a: Surface
     b: Surface
     T: Array
     shared: Common
-
-    @property
-    def hidden(self) -> float:
-        """What the meshes' errors may hide of a depth, mm."""
-        return self.a.error + self.b.error
+    hidden: float
 
 
 def _overlapping_meshes(a: Model, b: Model, T: Array) -> Iterator[_OverlappingMeshes]:
     """Meshes of two bodies that overlap, coarse ones of solids from CAD first; none where they are apart."""
     if not (a.chords and b.chords):
         return
-    for mesh_of in (_coarse_mesh, _fine_mesh) if a.exact is not None and b.exact is not None else (_fine_mesh,):
-        outer_a, outer_b = mesh_of(a), mesh_of(b)
+    both_exact = a.exact is not None and b.exact is not None
+    for chord_of in (_coarse_chord, _fine_chord) if both_exact else (_fine_chord,):
+        outer_a, outer_b = a.outer(chord_of(a)), b.outer(chord_of(b))
         shared = common(outer_a, outer_b, T)
+        hidden = outer_a.error + outer_b.error + sum(chord_of(model) for model in (a, b) if model.bracketed)
         if shared is not None:
-            yield _OverlappingMeshes(outer_a, outer_b, T, shared)
-        if outer_a.error + outer_b.error <= _EXACT:  # finer ones are the same
+            yield _OverlappingMeshes(outer_a, outer_b, T, shared, hidden)
+        if hidden <= _EXACT:  # finer ones are the same
             return
 
 
 def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Distance:
     """Minus the length of a translation along ``normal`` that parts two bodies, and minus a depth that a point has."""
-    if not (a.bracketed or b.bracketed):  # meshes around drawn bodies attest no depth
-        depth = max(depth, deepest(*meshes)[0])
+    depth = max(depth, _reached(a, b, meshes))
     length, direction = _way_by_meshes(meshes, depth)
     way = Distance(-length, -depth, normal=direction, method="meshes (FCL)")
-    if a.exact is None or b.exact is None or _is_long(way, meshes):
-        return way
-    from clamp3d.engine.exact import exact_way_out
+    for _ in range(_ADVANCES):
+        if _is_long(way, meshes) or -way.lower <= _TIGHT * -way.upper:
+            break
+        shorter = _shortened(a, b, meshes.T, -way.lower * direction)
+        upper = min(shorter.upper, way.upper)
+        # If it is shorter than a point is deep, some of the gap was overlooked.
+        if shorter.lower <= way.lower or upper < shorter.lower - 2.0 * TOLERANCE:
+            break
+        way = replace(shorter, upper=max(upper, shorter.lower))
+    return way
 
-    shorter = exact_way_out(a, b, meshes.T, length * direction)
-    if shorter.lower <= way.lower or min(shorter.upper, -depth) < shorter.lower - 2.0 * TOLERANCE:
-        return way  # no shorter, or shorter than a point is deep: then some of the gap was overlooked
-    return replace(shorter, upper=max(min(-depth, shorter.upper), shorter.lower))
+
+def _reached(a: Model, b: Model, meshes: _OverlappingMeshes) -> float:
+    """A depth (mm) that some point has: meshes around drawn bodies attest none, those inside them do."""
+    if not (a.bracketed or b.bracketed):
+        return deepest(*meshes[:4])[0]
+    inner_a, inner_b = a.inner(a.chords[-1]), b.inner(b.chords[-1])
+    if inner_a is None or inner_b is None:
+        return 0.0
+    shared = common(inner_a, inner_b, meshes.T)
+    return 0.0 if shared is None else deepest(inner_a, inner_b, meshes.T, shared)[0]
+
+
+def _shortened(a: Model, b: Model, T: Array, way: Array) -> Distance:
+    """Bounds of minus the depth: ``lower`` by a translation that parts the bodies, along ``normal``.
+
+    ``way`` (3,) parts them too. Lemma: bodies that keep a gap after a translation are also apart after one that is
+    shorter by as much, since no point moves by more. The points that are nearest after it are about as deep before.
+    """
+    from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance
+
+    moved = T.copy()
+    moved[:3, 3] += way
+    length = float(np.linalg.norm(way))
+    if a.exact is not None and b.exact is not None:
+        gap = exact_distance(a, b, moved)
+    else:
+        gap = refine(a, b, moved, from_boxes(a, b, moved), lambda d: d.upper - d.lower <= _SHORTENED * length)
+    if not gap.lower > 0.0:  # they touch, or no gap is certain
+        return Distance()
+    attested = 0.0
+    if gap.point_a is not None and gap.point_b is not None:
+        points = np.stack([gap.point_a, gap.point_b - way])
+        attested = min(0.0, attested_overlap(points, depths_in(a, b, T, points)).upper)
+    return Distance(gap.lower - length, attested, normal=way / length, method=gap.method)
 
 
 def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:
@@ -175,29 +216,31 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes) -> Distance:
         if np.isfinite(own.lower):
             return own
         *_, meshes = _overlapping_meshes(a, b, meshes.T)
-    return replace(own, lower=-meshes.hidden - thickness(*meshes, _is_sharp, FEW_CUTS), method="")
+    return replace(own, lower=-meshes.hidden - thickness(*meshes[:4], _is_sharp, FEW_CUTS), method="")
 
 
 def _is_sharp(bound: float, reached: float) -> bool:
     return bound <= _SHARP * reached
 
 
-def _coarse_mesh(model: Model) -> Surface:
-    return model.outer(model.chords[0])
+def _coarse_chord(model: Model) -> float:
+    return model.chords[0]
 
 
-def _fine_mesh(model: Model) -> Surface:
-    """The mesh that a depth is measured on: the coarse one where finer ones take too long."""
+def _fine_chord(model: Model) -> float:
+    """Chord error (mm) of the mesh that a depth is measured on: the coarse one where finer ones take too long."""
     finest = model.chords[min(1, len(model.chords) - 1)]
+    finest = finest if model.exact is None else max(finest, _CHORD)
     try:
-        return model.outer(finest if model.exact is None else max(finest, _CHORD))
+        model.outer(finest)
     except Clamp3dError:
-        return _coarse_mesh(model)
+        return _coarse_chord(model)
+    return finest
 
 
 def _way_by_meshes(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:
     """Length (mm) and direction (3,) of a translation of ``b`` after which meshes are apart."""
-    a, b, T, shared = meshes
+    a, b, T, shared, _ = meshes
     off = a.error + b.error + rounding_of(a, b, T)
     slack = 2.0 * off
     # Where two faces hold a body, as a V does, its way out is between their normals.

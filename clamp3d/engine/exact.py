@@ -57,40 +57,20 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     looks = [meshes[0].distance(points), meshes[1].distance(to_source(T, points))]
     orders = [np.argsort(-look, kind="stable")[:points_each] for look in (np.minimum(*looks), np.maximum(*looks))]
     points = points[np.concatenate(orders)]
-    return _attested(points, _depths(a, b, T, points))
+    return attested_overlap(points, depths_in(a, b, T, points))
 
 
-def _depths(a: Model, b: Model, T: Array, points: Array) -> Array:
-    """Signed depths (2, k) of points (k, 3) of a's frame in each of two solids, negative outside."""
-    assert a.exact is not None
-    assert b.exact is not None
-    in_a = cad_process.depths(a.exact.brep, points)
-    return np.stack([in_a, cad_process.depths(b.exact.brep, to_source(T, points))])
+def depths_in(a: Model, b: Model, T: Array, points: Array) -> Array:
+    """Signed depths (2, k) mm of points (k, 3) of a's frame in each of two bodies, negative outside."""
+    return np.stack([a.depth(points), b.depth(to_source(T, points))])
 
 
-def _attested(points: Array, depths: Array) -> Distance:
+def attested_overlap(points: Array, depths: Array) -> Distance:
     """The overlap that the deepest of points (k, 3) attests; one that lies beside a solid attests none."""
     beside = np.minimum(depths.min(axis=0), 0.0)  # by so much it is moved into both solids, and less deep
     overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, 0.0)
     k = int(np.argmax(overlaps))
     return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
-
-
-def exact_way_out(a: Model, b: Model, T: Array, way: Array) -> Distance:
-    """Bounds of minus the depth: ``lower`` by a translation that parts the solids, along ``normal``.
-
-    ``way`` (3,) parts them too. Lemma: solids that keep a gap after a translation are also apart after one that is
-    shorter by as much, since no point moves by more. The points that are nearest after it are about as deep before.
-    """
-    moved = T.copy()
-    moved[:3, 3] += way
-    gap = exact_distance(a, b, moved)
-    if gap.normal is None or gap.point_a is None or gap.point_b is None:  # they touch, or no gap is certain
-        return Distance()
-    length = float(np.linalg.norm(way))
-    points = np.stack([gap.point_a, gap.point_b - way])
-    attested = min(0.0, _attested(points, _depths(a, b, T, points)).upper)
-    return Distance(gap.lower - length, attested, normal=way / length, method=METHOD)
 
 
 def exact_overlap(
@@ -116,14 +96,14 @@ def exact_overlap(
     order = np.argsort(-at_most, kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).round().astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    depths = _depths(a, b, T, points[tried])
+    depths = depths_in(a, b, T, points[tried])
     at_most[tried] = np.abs(depths).max(axis=0)
     # Between the points the border is within a chord of straight lines, so nothing is much deeper. Some of what
     # Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
     most = float(at_most.max()) + shared.chord + max(0.0, -float(depths.min()))
     if most + TOLERANCE < attested:  # some of it is missing
         return unknown
-    return replace(_attested(points[tried], depths), lower=-most - TOLERANCE)
+    return replace(attested_overlap(points[tried], depths), lower=-most - TOLERANCE)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:

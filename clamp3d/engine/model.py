@@ -15,16 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.engine.closed_form import ClosedForm
+from clamp3d.engine.convex import Rod
 from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges
 from clamp3d.errors import Clamp3dError
+from clamp3d.files import cad_process
 from clamp3d.files.faces import CONE, CYLINDER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
-from clamp3d.geometry.pose import Array
-from clamp3d.geometry.shapes import MeshShape, Shape, Solid
+from clamp3d.geometry.pose import Array, to_target
+from clamp3d.geometry.shapes import MeshShape, Shape, Solid, cylinder
 
 if TYPE_CHECKING:
     from clamp3d.fit.fit import FitResult
@@ -69,10 +71,6 @@ class Model:
     """All that can be known of one shape; ``counters`` counts what is built."""
 
     shape: Shape
-    drawn = False
-    """Whether it is a drawn solid."""
-    bracketed = False
-    """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
     exact: BrepSolid | None = None
     """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
 
@@ -98,6 +96,11 @@ class Model:
     def is_simple(self) -> bool:
         """Whether it is closed, and no triangles cross each other: those of a given mesh may be walls inside it."""
         return True
+
+    @property
+    def bracketed(self) -> bool:
+        """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
+        return False
 
     @property
     def bounds(self) -> Array:
@@ -143,6 +146,16 @@ class Model:
             self.counters.built["triangles"] += 0 if mesh is None else len(mesh.faces)
         return self._meshes[chord, inside]
 
+    def depth(self, points: Array) -> Array:
+        """How deep (k,) mm points (k, 3) lie inside, never too much; negative outside."""
+        if self.bodies is not None:
+            return np.asarray(np.max([form.depth(points) - form.error for form in self.bodies], axis=0))
+        mesh = self.inner(self.chords[-1])
+        if mesh is None:
+            return np.full(len(points), -np.inf)
+        away = mesh.distance(points)
+        return np.asarray(np.where(mesh.contains(points), away, -away) - mesh.error)
+
     @property
     def refines(self) -> bool:
         """Whether a smaller chord error gives a better mesh."""
@@ -179,11 +192,11 @@ class DrawnModel(Model):
     """A drawn solid: exact pieces, and meshes inside and around it."""
 
     shape: Solid
-    drawn = True
 
-    def __init__(self, shape: Solid, counters: Counters) -> None:
-        super().__init__(shape, counters)
-        self.bracketed = any(outline.profile.arcs for outline in (*shape.bodies, *shape.holes))  # else a mesh is exact
+    @cached_property
+    def bracketed(self) -> bool:
+        """Whether it is round somewhere; else a mesh is exact."""
+        return any(outline.profile.arcs for outline in (*self.shape.bodies, *self.shape.holes))
 
     @cached_property
     def bounds(self) -> Array:
@@ -260,6 +273,10 @@ class CadModel(Model):
         flat = self.shape.surfaces.kind[tessellation.face] == PLANE
         return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
 
+    def depth(self, points: Array) -> Array:
+        """How deep (k,) mm points (k, 3) lie inside, by Open CASCADE; negative outside or where nobody knows."""
+        return cad_process.depths(self.shape.brep, points)
+
     def _surface(self, chord: float, inside: bool) -> Surface:
         mesh = self.shape.tessellated(chord)
         errors = at_edges(mesh.vertices, mesh.faces, mesh.errors, mesh.face, SMOOTH)
@@ -282,9 +299,14 @@ class MeshModel(Model):
         return self.closed and not self.shape.mesh.crosses_itself()
 
     @property
+    def bracketed(self) -> bool:
+        """Whether the fit says that it is a cylinder: then meshes lie inside and around that."""
+        return self._cylinder is not None
+
+    @property
     def chords(self) -> tuple[float, ...]:
-        """One, for the given triangles."""
-        return DRAWN_CHORDS[:1]
+        """Those of a drawn solid where it is a cylinder; else one, for the given triangles."""
+        return DRAWN_CHORDS if self.bracketed else DRAWN_CHORDS[:1]
 
     @cached_property
     def bounds(self) -> Array:
@@ -298,7 +320,7 @@ class MeshModel(Model):
         """Bodies around the mesh with the cylinders, grooves and holes of the fit, or its hull if it is convex."""
         if not self.is_simple:
             return None
-        mesh = self.outer(DRAWN_CHORDS[0])
+        mesh = self._facets
         if self._fit is None or not self._fit.features:
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
@@ -315,7 +337,28 @@ class MeshModel(Model):
         self.counters.built["fits"] += 1
         return fit_mesh(self.shape.mesh)
 
-    def _surface(self, chord: float, inside: bool) -> Surface:
+    @cached_property
+    def _cylinder(self) -> Rod | None:
+        """The cylinder that the fit takes all of the mesh for; None if some of it is something else."""
+        if not self.is_simple or self._fit is None or not self._fit.features:
+            return None
+        match self.bodies:
+            case (ClosedForm(outers=(Rod() as rod,), bores=(), surface=None),):
+                return rod
+        return None
+
+    def _surface(self, chord: float, inside: bool) -> Surface | None:
+        if self._cylinder is None or self.bodies is None:
+            return self._facets
+        mesh = (enclosed if inside else enclosing)(cylinder(self._cylinder.radius, self._cylinder.length), chord)
+        if mesh is None:
+            return None
+        vertices, faces = mesh
+        error = np.full(len(faces), self.bodies[0].error)
+        return Surface(to_target(self._cylinder.T, vertices), faces, error)
+
+    @cached_property
+    def _facets(self) -> Surface:
         """The triangles; round faces are off by the error of the fit, all by what the shape states."""
         V, F = self.shape.mesh.vertices, self.shape.mesh.faces
         error = np.full(len(F), self.shape.error)

@@ -50,13 +50,22 @@ class Common:
         """Outward unit normals (m, 3) of the triangles, and their areas (m,) in mm^2."""
         return normals_and_areas(self.vertices[self.faces])
 
+    @cached_property
+    def _largest(self) -> NDArray[np.int64]:
+        """Its largest triangles (k,)."""
+        _, area = self.areas
+        rows = np.argsort(-area, kind="stable")[:_INNER]
+        return np.asarray(rows[area[rows] > 0.0])
+
+    def middles(self) -> Array:
+        """The middles (k, 3) of the largest triangles: corners may lie where both bodies end."""
+        return np.asarray(self.vertices[self.faces[self._largest]].mean(axis=1))
+
     def inner_points(self) -> Array:
         """Points (k, 3) under the middles of the largest triangles, as deep as the part is thick on average."""
         normal, area = self.areas
-        rows = np.argsort(-area, kind="stable")[:_INNER]
-        rows = rows[area[rows] > 0.0]
         depth = self.volume / max(float(area.sum()), 1e-300)
-        points = self.vertices[self.faces[rows]].mean(axis=1) - depth * normal[rows]
+        points = self.middles() - depth * normal[self._largest]
         return np.asarray(points[Surface(self.vertices, self.faces).contains(points)])
 
     def directions(self, most: int = 4) -> Array:
@@ -90,11 +99,13 @@ def common(a: Surface, b: Surface, T: Array) -> Common | None:
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:
     """A depth (mm) that a point of one body certainly has inside the other, and the point (3,).
 
-    Some corners of the common part are tried, and points in it. They lie in both meshes; a point of the true body is
-    within the error of the faces near it, and the true surface of the other no nearer than its mesh less its error.
+    Some corners of the common part are tried, middles of its triangles, and points in it. They lie in both meshes; a
+    point of the true body is within the error of the faces near it, and the true surface of the other no nearer than
+    its mesh less its error.
     Negative: nothing is certain.
     """
-    points = np.vstack([shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)], shared.inner_points()])
+    corners = shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)]
+    points = np.vstack([corners, shared.middles(), shared.inner_points()])
     depth = np.maximum(a.distance(points), b.distance(to_source(T, points))) - a.error - b.error
     k = int(np.argmax(depth))
     return float(depth[k]), points[k]

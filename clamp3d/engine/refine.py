@@ -68,9 +68,9 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
         return
     if cad_forms or a.exact is None or b.exact is None:
         yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
-        if _is_round(b) and not a.drawn and a.chords:
+        if _is_round(b) and not a.bracketed and a.chords:
             yield "facets", rods_distance(a.outer(a.chords[-1]), b.bodies or (), T)
-        if _is_round(a) and not b.drawn and b.chords:
+        if _is_round(a) and not b.bracketed and b.chords:
             yield "facets", rods_distance(b.outer(b.chords[-1]), a.bodies or (), inverse(T)).moved(T).swapped()
     if a.exact is not None and b.exact is not None:
         yield from _levels_of_cad(a, b, T, enough, cad_forms)
@@ -129,8 +129,13 @@ def _chords(a: Model, b: Model) -> list[float]:
     if not (a.chords and b.chords):
         return []
     every = sorted({*a.chords, *b.chords}, reverse=True)
+    if not (a.refines or b.refines):
+        return every[:1]
     coarsest, finest = min(a.chords[0], b.chords[0]), min(a.chords[-1], b.chords[-1])
-    return [chord for chord in every if finest <= chord <= coarsest] if a.refines or b.refines else every[:1]
+    fixed = max((model.outer(coarsest).error for model in (a, b) if not model.refines), default=0.0)
+    chords = [chord for chord in every if finest <= chord <= coarsest]
+    # Where the triangles of one are given, meshes of the other that are much finer than their error say no more.
+    return chords[: 1 + next((k for k, chord in enumerate(chords) if chord <= fixed), len(chords))]
 
 
 def _agreed(old: Distance, new: Distance) -> Distance:

@@ -11,7 +11,7 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from clamp3d.engine import moving_pair
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import penetration
-from clamp3d.engine.exact import _attested, _depth_bounds, exact_distance, exact_overlap, exact_probe
+from clamp3d.engine.exact import _depth_bounds, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.refine import refine
@@ -155,7 +155,7 @@ def test_points_that_refute_a_missing_common_part_say_how_deep_it_is(monkeypatch
 
 def test_a_point_a_little_beside_one_solid_attests_as_much_less():
     for beside, overlap in ((0.0, 1e-4), (1.5e-6, 1e-4 - 1.5e-6), (3e-6, 0.0)):
-        found = _attested(np.zeros((1, 3)), np.array([[-beside], [1e-4]]))
+        found = attested_overlap(np.zeros((1, 3)), np.array([[-beside], [1e-4]]))
         assert found.upper == pytest.approx(1e-6 - overlap, abs=1e-12)
 
 

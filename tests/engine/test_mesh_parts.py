@@ -327,3 +327,21 @@ def test_a_plane_parts_a_small_part_from_one_that_it_lies_deep_in():
     assert -distance.lower == pytest.approx(5.5, abs=1e-6)
     moved = np.array([-0.5, 0.5])[:, None] - distance.lower * distance.normal
     assert union(moved, [FIRST, np.array(SECOND["touching"])]) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["drawn", "fitted"])
+def test_the_depth_and_the_volume_of_a_bar_pressed_into_a_v_are_known_closely(kind):
+    """By 0.1 mm: it lies 0.0707 mm deep in both flanks, and shares a segment of its circle with each."""
+    radius, length, deep = 15.0, 80.0, 0.1 / math.sqrt(2.0)
+    block = manifold3d.CrossSection([[(-30, -20), (30, -20), (30, 30), (0, 0), (-30, 30)]]).extrude(length)
+    vee = manifold_shape(block.translate((0.0, 0.0, -0.5 * length)))
+    turn = 2.0 * math.pi * np.arange(48) / 48.0
+    round_bar = manifold3d.CrossSection([radius * np.column_stack([np.cos(turn), np.sin(turn)])]).extrude(length)
+    fitted = manifold_shape(round_bar.translate((0.0, 0.0, -0.5 * length)), "round")
+    part = shapes.cylinder(radius, length) if kind == "drawn" else fitted
+    row = row_of(vee, part, translation(0.0, radius * math.sqrt(2.0) - 0.1, 0.0))
+    assert -0.1012 <= row.distance.lower <= -0.1
+    assert -deep - 1e-6 <= row.distance.upper <= -deep + 0.0012
+    segment = radius**2 * math.acos(1.0 - deep / radius) - (radius - deep) * math.sqrt((2.0 * radius - deep) * deep)
+    low, high = row.where.volume
+    assert low <= 2.0 * length * segment <= high <= 1.2 * low

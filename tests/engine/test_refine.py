@@ -126,11 +126,13 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
 
 def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
-    for a, b, chords in (
-        ((0.1, 0.02), (0.05, 0.01), [0.05, 0.02, 0.01]),
-        ((0.1,), (0.1, 0.02), [0.1, 0.02]),
-        ((0.1,), (0.05,), [0.1]),
-        ((), (0.1, 0.02), []),
+    for a, b, error, chords in (
+        ((0.1, 0.02), (0.05, 0.01), 0.03, [0.05, 0.02, 0.01]),
+        ((0.1,), (0.1, 0.02), 0.0, [0.1, 0.02]),
+        ((0.5,), (0.5, 0.1, 0.02, 0.01), 0.03, [0.5, 0.1, 0.02]),  # no finer than the error of the given triangles
+        ((0.1,), (0.05,), 0.0, [0.1]),
+        ((), (0.1, 0.02), 0.0, []),
     ):
-        first, second = (SimpleNamespace(chords=c, refines=len(c) > 1) for c in (a, b))
+        mesh = SimpleNamespace(error=error)
+        first, second = (SimpleNamespace(chords=c, refines=len(c) > 1, outer=lambda _, m=mesh: m) for c in (a, b))
         assert refine._chords(first, second) == refine._chords(second, first) == chords
