@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -12,8 +13,8 @@ from clamp3d.files.worker import process
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-_PATIENCE = 10.0
-"""Seconds in which a process of a busy machine gets one second of processor time."""
+_PATIENCE = 60.0 if hasattr(signal, "setitimer") else 3.0
+"""Seconds in which a process of a very busy machine gets one second of processor time, where that can be limited."""
 _FINE_SECONDS = 20.0
 """Time limit of triangles that are finer than usual: of splines they can take minutes, and others may decide."""
 _QUICK_SECONDS, _COMMON_SECONDS = 1.0, 5.0
