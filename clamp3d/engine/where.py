@@ -17,8 +17,8 @@ from clamp3d.geometry.pose import Array, to_target
 
 _SHARE = 0.005
 """Relative width of the interval of the volume at which it is not refined further."""
-_EXACT = 1e-6
-"""Relative accuracy taken for a volume by Open CASCADE."""
+_EXACT = 1e-5
+"""Relative accuracy taken for a volume by Open CASCADE, beside what two integrations differ by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,12 @@ class Overlap:
     box: Array
     of_facets: bool = False
     point: Array | None = None
+
+    def refined(self, finer: Overlap) -> Overlap:
+        """Both answers at once; this one where they contradict each other: then some is lost in the other."""
+        low, high = max(self.volume[0], finer.volume[0]), min(self.volume[1], finer.volume[1])
+        point = self.point if finer.point is None else finer.point
+        return self if low > high else replace(finer, volume=(low, high), point=point)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -72,7 +78,7 @@ class Locator:
         for overlap in self._overlaps():
             if overlap is None:
                 continue
-            best = overlap if best is None or overlap.point is not None else replace(overlap, point=best.point)
+            best = overlap if best is None else best.refined(overlap)
             if best.volume[1] - best.volume[0] <= _SHARE * best.volume[1]:
                 break
         return best
@@ -122,7 +128,8 @@ class Locator:
         if not shared.volume > 0.0:
             return None
         corners = to_target(self.T_a, box_corners(shared.box))
-        return Overlap((shared.volume * (1.0 - _EXACT), shared.volume * (1.0 + _EXACT)), _box(corners))
+        low, high = shared.volumes
+        return Overlap((low * (1.0 - _EXACT), high * (1.0 + _EXACT)), _box(corners))
 
 
 def _box(points: Array, slack: float = 0.0) -> Array:

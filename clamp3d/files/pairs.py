@@ -21,6 +21,7 @@ from clamp3d.files.open_cascade import (
     occ,
     parse,
     volume_of,
+    volumes_of,
 )
 from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
@@ -50,7 +51,8 @@ class Border:
 class CommonPart:
     """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
 
-    ``borders``, if any, are on the first and on the second solid, within ``chord`` mm of their triangles.
+    ``borders``, if any, are on the first and on the second solid, within ``chord`` mm of their triangles; without them
+    ``volumes`` is the volume by two integrations, the smaller first.
     """
 
     volume: float
@@ -58,6 +60,7 @@ class CommonPart:
     box: Array
     borders: tuple[Border, ...] = ()
     chord: float = 0.0
+    volumes: tuple[float, float] = (0.0, 0.0)
 
 
 class Nearest(NamedTuple):
@@ -141,7 +144,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         return CommonPart(0.0, 0.0, np.zeros((2, 3)))
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
     if share is None:
-        return CommonPart(volume, area, box)
+        return CommonPart(volume, area, box, volumes=volumes_of(shape))
     chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
     occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))

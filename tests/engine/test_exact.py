@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
+from clamp3d import Scene, check
 from clamp3d.engine import moving_pair
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import penetration
@@ -66,6 +67,19 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert -distance.lower > 0.5
     assert ("CASCADE" in distance.method) is found
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
+
+
+def test_a_shared_volume_holds_where_open_cascade_integrates_badly():
+    """A tube squeezed to free-form faces, whose volume Open CASCADE integrates 1 % too large."""
+    squeeze = occ.gp_GTrsf()
+    squeeze.SetValue(1, 1, 1.7)
+    squeeze.SetValue(2, 2, 0.6)
+    tube = cut(rod(10.0, 0.0, 20.0), rod(7.0, -5.0, 35.0, 1.0))
+    tube = first_solid(occ.BRepBuilderAPI_GTransform(tube, squeeze, True).Shape())
+    scene = Scene().add("block", BrepSolid.of(block((-50, -50, -50), (50, 50, 50)), "block"))
+    (row,) = check(scene.add("tube", BrepSolid.of(tube, "tube"))).pairs
+    low, high = row.where.volume
+    assert low <= 1.7 * 0.6 * np.pi * (10.0**2 - 7.0**2) * 20.0 <= high <= 1.02 * low
 
 
 @pytest.mark.parametrize("gap", [-8.0, -0.5])
