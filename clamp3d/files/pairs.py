@@ -23,7 +23,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, points_on, triangles_of
+from clamp3d.files.tessellation import ANGLE, SAMPLED, edge_middles, points_on, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
 
@@ -31,12 +31,14 @@ _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
 
 
-_AT_EDGES = 9.0 / 4.0
-"""How many times as far as in a triangle's middle a quadratic surface can be from it, at the middle of an edge."""
 _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
+_COARSER = 16.0
+"""How much coarser Open CASCADE meshes the inside of a common part's faces than their edges."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
+_MOST_SAMPLES = 100_000
+"""Triangles from which on a face of a common part is cut no further."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,22 +147,37 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
     if share is None:
         return CommonPart(volume, area, box, volumes=volumes_of(shape))
-    chord = max(share * volume / max(area, 1e-300), share / _SLENDER * float(np.linalg.norm(box[1] - box[0])))
-    occ.BRepMesh_IncrementalMesh(shape, max(chord, TOLERANCE), False, ANGLE, False)
+    size = float(np.linalg.norm(box[1] - box[0]))
+    sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
+    _mesh_borders(shape, sag)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[tuple[Array, IntArray]], ...] = ([], [])
-    chord = 0.0
+    chord = sag
     for k, face in enumerate(explore(shape, "FACE")):
-        points, quads = _samples(face, k)
-        if not len(quads):
+        uv, off = _samples(face, k, sag)
+        if not len(uv):
             continue
-        chord = max(chord, _AT_EDGES * float(_heights(points[quads]).max()))
-        middle = points[quads[len(quads) // 2, 3]]
+        chord = max(chord, SAMPLED * off)
+        (middle,) = points_on(face, uv[len(uv) // 2].mean(axis=0, keepdims=True))
         away = [boundary.foot(middle).distance for boundary in boundaries]
+        corners, rows = np.unique(uv.reshape(-1, 2), axis=0, return_inverse=True)  # triangles share their corners
+        points = points_on(face, corners)
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
-                side.append((points, quads[:, :3]))
+                side.append((points, rows.reshape(-1, 3)))
     return CommonPart(volume, area, box, tuple(map(_joined, sides)), chord)
+
+
+def _mesh_borders(shape: Any, chord: float) -> None:
+    """Triangles of the faces of a TopoDS_Shape: their edges are within ``chord`` mm, the inside of faces is coarser.
+
+    Open CASCADE takes seconds to mesh the inside of slender free-form faces finely: `_samples` does.
+    """
+    how = occ.IMeshTools_Parameters()
+    how.Deflection, how.DeflectionInterior = chord, _COARSER * chord
+    how.Angle = how.AngleInterior = ANGLE
+    occ.BRepTools.Clean_s(shape)
+    occ.BRepMesh_IncrementalMesh(shape, how)
 
 
 def _joined(side: list[tuple[Array, IntArray]]) -> Border:
@@ -181,29 +198,37 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, number: int) -> tuple[Array, IntArray]:
-    """Points (n, 3) of a meshed face, and those (m, 4) of each triangle, at its corners and in its middle.
+def _samples(face: Any, number: int, sag: float) -> tuple[Array, float]:
+    """Triangles (m, 3, 2) of a meshed face in its surface's parameters, and how far (mm) an edge's middle is from it.
 
-    Meshes of a face may have no point inside of it, so its triangles are cut in the surface's parameters.
+    They are cut in two at the middle of an edge until no middle is farther than ``sag`` mm, or there are too many.
     """
-    _, triangles, uv = triangles_of(face, number)
-    corners = uv[triangles]
-    while 0 < len(corners) < _SAMPLES:
-        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-        at_corners = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
-        corners = np.concatenate([middles, *at_corners])
-    everything = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 2)
-    uv, place = np.unique(everything, axis=0, return_inverse=True)  # triangles share their corners
-    return points_on(face, uv), place.reshape(-1, 4)
+    points, triangles, uv = triangles_of(face, number)
+    corners, ends = uv[triangles], points[triangles]
+    finished, count, farthest = [np.empty((0, 3, 2))], len(triangles), 0.0
+    while len(corners):
+        middles = edge_middles(corners)
+        true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
+        off = np.linalg.norm(true - edge_middles(ends), axis=2)
+        wide = off.max(axis=1) > sag
+        if count < _SAMPLES and not wide.any():
+            wide[:], off = True, np.linalg.norm(np.roll(ends, -1, axis=1) - ends, axis=2)
+        if count > _MOST_SAMPLES:
+            wide[:] = False
+        finished.append(corners[~wide])
+        farthest = max(farthest, float(off[~wide].max(initial=0.0)))
+        count += int(wide.sum())
+        edge = off[wide].argmax(axis=1)
+        corners = _halves(corners[wide], middles[wide], edge)
+        ends = _halves(ends[wide], true[wide], edge)
+    return np.concatenate(finished), farthest
 
 
-def _heights(points: Array) -> Array:
-    """How far (m,) the last of four points (m, 4, 3) is from the plane of the others; of slivers from their middle."""
-    a, b, c, last = points.transpose(1, 0, 2)
-    normal, offset = np.cross(b - a, c - a), last - (a + b + c) / 3.0
-    size, away = np.linalg.norm(normal, axis=1), np.linalg.norm(offset, axis=1)
-    height = np.abs(np.einsum("ij,ij->i", normal, offset)) / np.maximum(size, 1e-300)
-    return np.asarray(np.where(size > 1e-6 * away**2, height, away))
+def _halves(corners: Array, middles: Array, edge: IntArray) -> Array:
+    """Triangles (2 m, 3, k): each of (m, 3, k) cut in two from the middle of an edge, whose number (m,) is given."""
+    rows = np.arange(len(corners))
+    a, b, c, middle = corners[rows, edge], corners[rows, (edge + 1) % 3], corners[rows, edge - 1], middles[rows, edge]
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -134,7 +134,7 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
         true, corner = points_on(face, np.column_stack([every.real, every.imag]))[row.reshape(-1)], 0.0
         off = np.linalg.norm(closest_points(np.repeat(points[triangles], len(_PLACES), axis=0), true) - true, axis=1)
     else:
-        middles = _middles(points[triangles])
+        middles = edge_middles(points[triangles])
         off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
         corner = float(heights.max())
     return np.asarray(_FACTORS[kind] * off.reshape(len(triangles), -1).max(axis=1) + corner)
@@ -151,7 +151,7 @@ def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Ar
         return off
     surface = occ.BRepAdaptor_Surface(face)
     grids = [_grid(surface, along) for along in "UV"]
-    seen = np.concatenate([uv, _middles(uv[triangles]).reshape(-1, 2)])
+    seen = np.concatenate([uv, edge_middles(uv[triangles]).reshape(-1, 2)])
     cells = [np.clip(np.searchsorted(grid, x) - 1, 0, len(grid) - 2) for grid, x in zip(grids, seen.T, strict=True)]
     empty = np.ones([len(grid) - 1 for grid in grids], dtype=bool)
     empty[tuple(cells)] = False
@@ -188,7 +188,8 @@ def _numbers(count: int) -> Any:
     return (made or occ.TColStd_Array1OfReal)(1, count)
 
 
-def _middles(corners: Array) -> Array:
+def edge_middles(corners: Array) -> Array:
+    """The middles (m, 3, k) of the edges of triangles (m, 3, k), each of that which begins at a corner."""
     return np.asarray(0.5 * (corners + np.roll(corners, -1, axis=1)))
 
 
