@@ -12,7 +12,7 @@ from clamp3d.errors import InputError
 
 
 def render(template: str, /, package: str = "clamp3d.output", **values: Any) -> str:
-    """Fill in one of the files in a package's ``templates``: HTML pages escape texts, a missing value is an error."""
+    """Fill in one of the files in a package's ``templates``: HTML and XML escape texts, a missing value is an error."""
     return str(_environment(package).get_template(template).render(**values))
 
 
@@ -38,7 +38,7 @@ def _environment(package: str) -> Any:
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "templates"),
-        autoescape=jinja2.select_autoescape(["html"]),
+        autoescape=jinja2.select_autoescape(["html", "bcf", "bcfv"]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,

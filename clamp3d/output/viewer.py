@@ -28,7 +28,7 @@ from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
-from clamp3d.output.serving import Command, CommandLog, MeshcatServer, PageServer
+from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer
 from clamp3d.output.viewer_scene import Pieces, SceneDrawing
 from clamp3d.output.viewer_story import LISTED, ClampStory, Stop, Story, findings_of, findings_of_clamp
 from clamp3d.output.wording import by_group, headline, meanings, severity, titles
@@ -71,12 +71,13 @@ class Viewer(AbstractContextManager["Viewer"]):
         overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
         self._source = shown if isinstance(shown, ClampStory) else Story(shown)
-        self._server, self._log = server, CommandLog()
+        self._server = server
+        self._log = CommandLog(server if isinstance(server, MeshcatServer) else None)
         self._mesh_error, self._overlays = mesh_error, overlays or {}
         self._rows: dict[tuple[str, str], PairResult] = {}
         self._looked = -math.inf
         self._panel = ""
-        self._drawing = SceneDrawing(self._source, self._send, mesh_error, self._overlays)
+        self._drawing = SceneDrawing(self._source, self._log, mesh_error, self._overlays)
         self.story: dict[str, Any] = {}
         """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
         self._tell(self._source.waiting, "waiting")
@@ -153,7 +154,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             pair = {"a": finding["a"], "b": finding["b"]}
             rows = [self.answer(pair | {"time": str(s)})["rows"][0] for s in finding["moments"]]
             self.story["curves"][str(k)] = [[row["at_least_mm"], row["at_most_mm"]] for row in rows]
-        self._send_story()
+        self._keep_story()
         return self._page(self._log.messages())
 
     def _page(self, messages: list[str]) -> str:
@@ -172,13 +173,8 @@ class Viewer(AbstractContextManager["Viewer"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _send(self, command: Command) -> None:
-        self._log.add(command)
-        if isinstance(self._server, MeshcatServer) and command["type"] != "set_story":
-            self._server.send(command)
-
-    def _send_story(self) -> None:
-        self._send({"type": "set_story", "path": "", "value": self.story | {"panel": self._panel}})
+    def _keep_story(self) -> None:
+        self._log.add({"type": "set_story", "path": "", "value": self.story | {"panel": self._panel}})
 
     @property
     def _accuracy(self) -> str:
@@ -223,7 +219,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             "version": __version__,
         }
         self._panel = render("viewer.panel.html", **(self.story | context | more))
-        self._send_story()
+        self._keep_story()
 
 
 def view(
