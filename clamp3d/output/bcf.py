@@ -19,7 +19,8 @@ from clamp3d.output.wording import group_text, sentence, titles
 _TOPICS = 200
 """Groups that get a topic at most, the first ones: each has a picture, which takes half a second."""
 _METRES = 1e-3
-_VERSION = b'<Version VersionId="2.1"><DetailedVersion>2.1</DetailedVersion></Version>'
+_VERSION = b"""<?xml version='1.0' encoding='utf-8'?>
+<Version VersionId="2.1"><DetailedVersion>2.1</DetailedVersion></Version>"""
 
 
 def write_bcf(result: CheckResult, path: Path) -> None:

@@ -8,6 +8,7 @@ import os
 from functools import cache
 from typing import Any
 
+from clamp3d import __version__
 from clamp3d.errors import InputError
 
 
@@ -34,6 +35,7 @@ def now() -> datetime.datetime:
 def _environment(package: str) -> Any:
     import jinja2
 
+    from clamp3d.output.palette import VERDICT_COLOURS
     from clamp3d.output.wording import counted, distance_text, first_text
 
     environment = jinja2.Environment(
@@ -44,4 +46,5 @@ def _environment(package: str) -> Any:
         undefined=jinja2.StrictUndefined,
     )
     environment.globals |= {"gap": distance_text, "first_text": first_text, "counted": counted, "degrees": math.degrees}
+    environment.globals |= {"verdict_colours": VERDICT_COLOURS, "version": __version__}
     return environment

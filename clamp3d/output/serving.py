@@ -37,6 +37,11 @@ Command = dict[str, Any]
 Answer = Callable[[Mapping[str, str]], str | dict[str, Any]]
 
 
+def server_at(url: str | None, host: str, port: int | None) -> PageServer | MeshcatServer:
+    """The meshcat server at ``url``, where that is given, else one of our own. Raises InputError, Clamp3dError."""
+    return PageServer(host, port) if url is None else MeshcatServer(url)
+
+
 class CommandLog:
     """The commands that still matter, in order: a later one replaces an earlier one of the same kind at its place.
 
