@@ -161,8 +161,8 @@ def label_column(
 
 def note(ax: Axes, text: str, at: Point, offset: Point = (0.0, 0.0), **style: Any) -> None:
     """A text in ink at a point of the axes, or as ``style`` says, ``offset`` (pt) to the right and up of it."""
-    style = {"color": INK, "fontsize": 8} | style
-    ax.annotate(text, at, offset, textcoords="offset points", **style)
+    look: dict[str, Any] = {"color": INK, "fontsize": 8, **style}
+    ax.annotate(text, at, offset, textcoords="offset points", **look)
 
 
 def label(clamp: Clamp, name: PartName) -> str:
