@@ -151,7 +151,6 @@ class MeasureImage:
     kind: Literal["height", "straight"] = option(
         "Square to the reference line, or straight from point to point.",
         "--measure",
-        type=click.Choice(["height", "straight"]),
         default="height",
     )
     snap: float | None = option("Move each mark to the strongest corner within PX pixels.", metavar="PX")

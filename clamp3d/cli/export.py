@@ -9,12 +9,12 @@ import click
 
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
-from clamp3d.cli.options import SEQUENCE, UNITS, Quiet, Source, command, option
+from clamp3d.cli.options import SEQUENCE, Quiet, Source, Unit, command, option
 from clamp3d.cli.terminal import bar, finish, show
 from clamp3d.engine.check import check
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
-from clamp3d.output.export import FORMATS, Format, Layout, default_layout, destination, export
+from clamp3d.output.export import Format, Layout, default_layout, destination, export
 
 
 @command("export")
@@ -27,7 +27,7 @@ class Export(Source, Quiet):
     step of the sequence is blocked.
     """
 
-    format: Format | None = option("By default the suffix of FILE.", "--format", "-f", type=click.Choice(FORMATS))
+    format: Format | None = option("By default the suffix of FILE.", "--format", "-f")
     output: Path = option(
         "A folder, or one file that ends in a format's suffix.",
         "--output",
@@ -37,8 +37,7 @@ class Export(Source, Quiet):
         metavar="DIR|FILE",
     )
     layout: Layout | None = option(
-        "One file per part, or one for all.  [default: assembly for a FILE and for glb, 3mf, step; else parts]",
-        type=click.Choice(["parts", "assembly"]),
+        "One file per part, or one for all.  [default: assembly for a FILE and for glb, 3mf, step; else parts]"
     )
     state: str | None = option(
         "Place a clamp's parts as they stand there; a step by name or number.  [default: final for an assembly; "
@@ -48,7 +47,7 @@ class Export(Source, Quiet):
     sequence: str | None = SEQUENCE
     mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM")
     clashes: bool = option("Check the parts, and add what clashing parts have in common as red bodies.", "--clashes")
-    file_unit: str | None = option("Unit of the file.  [default: mm; m for glb]", "--unit", type=click.Choice(UNITS))
+    file_unit: Unit | None = option("Unit of the file.  [default: mm; m for glb]", "--unit")
 
     def run(self) -> None:
         """Place the parts and write them."""

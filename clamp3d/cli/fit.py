@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from clamp3d.cli.options import JSON, UNITS, Quiet, argument, command, option
+from clamp3d.cli.options import JSON, Quiet, Unit, argument, command, option
 from clamp3d.cli.terminal import bar, save, show
 from clamp3d.fit.fit import fit_file
 from clamp3d.output.fit_report import fit_to_html, fit_to_text
@@ -20,9 +20,7 @@ class Fit(Quiet):
     """
 
     mesh: Path = argument(metavar="MESH", type=click.Path(path_type=Path))
-    unit: str | None = option(
-        "Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY, OFF]", type=click.Choice(UNITS)
-    )
+    unit: Unit | None = option("Unit of the file's numbers.  [default: the file's own; mm for STL, OBJ, PLY, OFF]")
     json_file: Path | None = JSON
     html_file: Path | None = option("Write a page: the mesh, its features, their errors.", "--html")
 

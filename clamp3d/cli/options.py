@@ -8,7 +8,8 @@ import os
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 import click
 from click.shell_completion import CompletionItem
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
     from clamp3d.clamp.result import Assembly, Waypoint
     from clamp3d.engine.scene import Scene
-    from clamp3d.geometry.shapes import Fit
 
-UNITS = ("mm", "cm", "m", "in")
+Unit: TypeAlias = Literal["mm", "cm", "m", "in"]
 
 
 def number(text: str | float) -> float:
@@ -89,25 +89,34 @@ class Output(click.Path):
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
-_USUAL: dict[str, dict[str, Any]] = {
-    "bool": {"is_flag": True},
-    "float": {"type": number},
-    "Path": {"type": Output(), "metavar": "FILE"},
-}
 
 
 def option(text: str, *names: str, **settings: Any) -> Any:
     """An option with the help ``text``, as the value of the attribute that gets what is given.
 
     Without ``names`` it is called as the attribute. ``settings`` are those of `click.Option`; of an attribute that is
-    annotated as a bool, a float or a Path the type follows from the annotation. A default is shown.
+    annotated as a bool, a float, a Path or a Literal the type follows from the annotation. A default is shown.
     """
 
-    def make(name: str, annotation: str) -> click.Option:
-        usual = _USUAL.get(annotation.removesuffix(" | None"), {}) | {"show_default": "default" in settings}
+    def make(name: str, annotation: Any) -> click.Option:
+        usual = _of_type(annotation) | {"show_default": "default" in settings}
         return click.Option([*(names or [f"--{name.replace('_', '-')}"]), name], help=text, **(usual | settings))
 
     return make
+
+
+def _of_type(annotation: Any) -> dict[str, Any]:
+    """What the type of an attribute says of its option."""
+    if get_origin(annotation) in (Union, UnionType):
+        annotation = get_args(annotation)[0]  # ``X | None``
+    if get_origin(annotation) is Literal:
+        return {"type": click.Choice(get_args(annotation))}
+    usual: dict[Any, dict[str, Any]] = {
+        bool: {"is_flag": True},
+        float: {"type": number},
+        Path: {"type": Output(), "metavar": "FILE"},
+    }
+    return usual.get(annotation, {})
 
 
 def argument(**settings: Any) -> Any:
@@ -122,11 +131,9 @@ def command(name: str) -> Callable[[type[Any]], click.Command]:
     """
 
     def decorate(kind: type[Any]) -> click.Command:
-        parameters: dict[str, click.Parameter] = {}
-        for base in kind.__mro__:
-            for key, annotation in inspect.get_annotations(base).items():
-                if key not in parameters:
-                    parameters[key] = getattr(base, key)(key, annotation)
+        types = get_type_hints(kind)
+        keys = dict.fromkeys(key for base in kind.__mro__ for key in inspect.get_annotations(base))
+        parameters: dict[str, click.Parameter] = {key: getattr(kind, key)(key, types[key]) for key in keys}
 
         def call(**values: Any) -> None:
             instance = kind()
@@ -225,12 +232,9 @@ class Source(ClampSource):
     """What a command is to work on: a clamp, a scene or a file with parts."""
 
     source: str = argument(metavar="[INPUT]", default="reference", required=False, shell_complete=complete_inputs)
-    unit: str | None = option(
-        "Unit of a mesh file.  [default: mm; m for glTF]", "--input-unit", type=click.Choice(UNITS)
-    )
-    fit: Fit | None = option(
-        "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]",
-        type=click.Choice(["off", "round"]),
+    unit: Unit | None = option("Unit of a mesh file.  [default: mm; m for glTF]", "--input-unit")
+    fit: Literal["off", "round"] | None = option(
+        "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]"
     )
     chord: float | None = option("How far a mesh file's true surface can be from its facets.", metavar="MM")
     joints: dict[str, float] | None = option(
@@ -268,10 +272,9 @@ class Method(Quiet):
     )
     threshold: float | None = option("Concavity that CoACD may leave: hulls.  [default: 2]", metavar="MM")
     mesh_error: float | None = option("Chord error of hulls and mesh.  [default: 0.05]", metavar="MM")
-    solver: str | None = option(
+    solver: Literal["exact", "stepped", "bisection"] | None = option(
         "How the final state is computed.  [default: exact for cas and chords, bisection for the others; stepped with "
-        "--step]",
-        type=click.Choice(["exact", "stepped", "bisection"]),
+        "--step]"
     )
     sequence: str | None = SEQUENCE
     step: float | None = option("Move along the bolt, stepped solver.  [default: 1/3]", metavar="MM")

@@ -12,7 +12,7 @@ from clamp3d.cli.options import JSON, ClampSource, Method, command, number, opti
 from clamp3d.cli.terminal import finish, save, show
 from clamp3d.cli.view import Viewing
 from clamp3d.errors import SequenceError
-from clamp3d.output.run_report import run_to_text
+from clamp3d.output.run_report import bands_to_text, measured_to_text, run_to_text, tightening_to_text
 
 if TYPE_CHECKING:
     from clamp3d.clamp.result import Assembly
@@ -59,23 +59,23 @@ class Mechanics:
             return f"torque and friction: not computed, {run.status}", {}
         from clamp3d.clamp.friction import FrictionBand
         from clamp3d.clamp.torque import GROOVE_FRICTION, THREAD_FRICTION, coefficients, tighten
-        from clamp3d.output.forces_report import bands_to_text, measured_to_text, tightening_to_text
 
-        text, data = "", dict[str, Any]()
+        blocks, data = list[str](), dict[str, Any]()
         groove = self.groove_friction or GROOVE_FRICTION
         if self.torque is not None:
             tight = tighten(run, self.torque, friction=self.friction or THREAD_FRICTION, groove_friction=groove)
-            text, data["torque"] = f"\n{tightening_to_text(tight)}\n", tight.to_dict()
+            blocks.append(tightening_to_text(tight))
+            data["torque"] = tight.to_dict()
         if self.torque is None or self.measured is not None:
             finder = FrictionBand(run.clamp)
             bands = [finder.band(mu) for mu in coefficients("groove friction", groove)]
-            text += f"\n{bands_to_text(bands)}\n"
+            blocks.append(bands_to_text(bands))
             data["friction_band"] = {"bands": [band.to_dict() for band in bands]}
             if self.measured is not None:
                 least = finder.friction_for(self.measured)
-                text += f"{measured_to_text(finder, bands, self.measured, least)}\n"
+                blocks[-1] += "\n" + measured_to_text(finder, bands, self.measured, least)
                 data["friction_band"]["measured"] = {"distance_mm": self.measured, "least_friction": least}
-        return text.removesuffix("\n"), data
+        return "\n" + "\n\n".join(blocks), data
 
     def _is_asked(self) -> bool:
         return any(getattr(self, key) is not None for key in Mechanics.__annotations__)

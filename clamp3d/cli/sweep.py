@@ -23,7 +23,7 @@ class Sweep(ClampSource, Quiet):
     lip, or not clamped. For the lean, the wire is held at its place and turned while the splints close on it.
     """
 
-    wire: Literal["P6", "P7"] = option("Line or jumper.", type=click.Choice(["P6", "P7"]), default="P6")
+    wire: Literal["P6", "P7"] = option("Line or jumper.", default="P6")
     steps: int = option("Start places across, a quarter as many in height.", type=click.IntRange(4, 1000), default=40)
     yaw_deg: float = option("Search the yaw up to this (about the bolt).", default=6.0, metavar="A")
     pitch_deg: float = option("Search the pitch up to this (about the cross axis).", default=3.0, metavar="A")

@@ -29,9 +29,7 @@ class Tolerance(ClampSource, Quiet):
     tolerance: float | None = option("Plus or minus, for each dimension.  [default: ISO 2768-1 m]", metavar="MM")
     wire_tolerance_percent: float = option("Plus or minus, for the wire diameters.", default=1.0, metavar="P")
     distribution: Literal["uniform", "normal"] = option(
-        "Within the tolerance, or with 3 sigma = tolerance.",
-        type=click.Choice(("uniform", "normal")),
-        default="uniform",
+        "Within the tolerance, or with 3 sigma = tolerance.", default="uniform"
     )
     processes: int = option("Processes.", type=click.IntRange(1, 1024), default=1)
     scheduler: str | None = option("Spread over this Dask cluster (extra 'cluster').", metavar="ADDRESS")

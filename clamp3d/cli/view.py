@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -16,7 +15,7 @@ import click
 from clamp3d.baselines import contact_model
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.cli.options import CLEARANCE, Method, Quiet, Source, command, option
-from clamp3d.cli.terminal import bar, finish, show
+from clamp3d.cli.terminal import bar, finish, save, show
 from clamp3d.engine.check import check
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError, SequenceError
@@ -101,18 +100,15 @@ class Viewing(Quiet):
         self, shown: ClampStory | Scene, serve: bool, overlays: dict[str, Any] | None = None
     ) -> Iterator[Viewer]:
         """A viewer as the options say; its page is served on when the work is done."""
-        from clamp3d.output.serving import MeshcatServer, PageServer
+        from clamp3d.output.serving import PageServer, server_at
         from clamp3d.output.viewer import Viewer
 
-        server: PageServer | MeshcatServer | None = None
-        if self.url is not None:
-            if self.port is not None or self.timeout is not None:
-                raise click.UsageError("--port and --timeout go with a page served here, not with --url")
-            server = MeshcatServer(self.url)
-        elif serve:
-            server = PageServer(self.host, self.port)
-        elif self.open_browser:
+        if self.url is not None and (self.port is not None or self.timeout is not None):
+            raise click.UsageError("--port and --timeout go with a page served here, not with --url")
+        is_served = serve or self.url is not None
+        if self.open_browser and not is_served:
             raise click.UsageError("--open goes with a page that is served, not with --html alone")
+        server = server_at(self.url, self.host, self.port) if is_served else None
         with Viewer(shown, server, mesh_error=self.draw_error, overlays=overlays) as viewer:
             if server is not None:
                 show(server.url)
@@ -126,10 +122,9 @@ class Viewing(Quiet):
                     threading.Event().wait(self.timeout)
 
     def _save(self, viewer: Viewer) -> None:
-        if self.html_file is not None:
-            viewer.save_html(self.html_file)
-            if self.html_file != STDOUT:
-                show(os.fspath(self.html_file))
+        save(self.html_file, viewer.html)
+        if self.html_file not in (None, STDOUT):
+            show(str(self.html_file))
 
 
 def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimesh]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from clamp3d.geometry.profile import MIN_MESH_ERROR
 from clamp3d.output.figures import blank, near, same_scale, title
 from clamp3d.output.palette import DIMENSION, INK, PART_COLOURS
 from clamp3d.output.placed import PosedMesh
-from clamp3d.output.section import ARROW, Poses, balloon, draw_section, label, label_column, part_anchor
+from clamp3d.output.section import ARROW, Poses, balloon, draw_section, label, label_column, note, part_anchor
 from clamp3d.output.view3d import Camera, draw_solids
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ def exploded_figure(clamp: Clamp) -> Figure:
     x, y = corners["P6"][corners["P6"][:, 0].argmin()]
     ax.plot([x - 0.09 * width, x], [y, y], color=INK, lw=0.5, marker=".", markevery=[1], ms=3.5, zorder=30)
     balloon(ax, "P6", x - 0.09 * width, y, size=8.0)
-    below: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 8, "color": INK}
-    ax.annotate(label(clamp, "P6"), (x - 0.09 * width, y), (0, -13), **below)
+    note(ax, label(clamp, "P6"), (x - 0.09 * width, y), (0, -13), ha="center", va="top")
     ax.set_xlim(x0 - 0.18 * width, x1 + 0.32 * width)
     title(ax, "exploded view", f"{clamp.name} clamp: seven parts")
     return figure

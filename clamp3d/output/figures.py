@@ -20,14 +20,7 @@ from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError, need
 from clamp3d.output.files import STDOUT, whole_file
 from clamp3d.output.palette import INK, VERDICT_COLOURS
-from clamp3d.output.section import (
-    Poses,
-    draw_dimensions,
-    draw_labels,
-    draw_section,
-    edge_openings,
-    label_wires,
-)
+from clamp3d.output.section import Poses, draw_dimensions, draw_labels, draw_section, edge_openings, label_wires, note
 from clamp3d.output.wording import distance_text
 
 if TYPE_CHECKING:
@@ -175,16 +168,14 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
 def numbered(ax: Axes, number: int, at: tuple[float, float], colour: str = INK, offset: float = 0.0) -> None:
     """A number in a circle at a point, ``offset`` (pt) up and to the right of it."""
     box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": colour, "lw": 1.2}
-    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.5, "fontweight": "bold", "color": INK}
-    ax.annotate(str(number), at, (offset, offset), textcoords="offset points", bbox=box, zorder=46, **style)
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.5, "fontweight": "bold", "zorder": 46}
+    note(ax, str(number), at, (offset, offset), bbox=box, **style)
 
 
 def title(ax: Axes, text: str, below: str = "") -> None:
     """A bold title and a smaller line under it, on the left."""
     ax.set_title(f"{text}\n", fontsize=11, fontweight="bold", loc="left", color=INK)
-    ax.annotate(
-        below, (0.0, 1.0), (0.0, 8.0), "axes fraction", textcoords="offset points", fontsize=8.5, color=INK, va="bottom"
-    )
+    note(ax, below, (0.0, 1.0), (0.0, 8.0), xycoords="axes fraction", fontsize=8.5, va="bottom")
 
 
 def near(clamp: Clamp, poses: Poses) -> dict[Any, Any]:

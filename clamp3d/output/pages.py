@@ -8,11 +8,12 @@ import os
 from functools import cache
 from typing import Any
 
+from clamp3d import __version__
 from clamp3d.errors import InputError
 
 
 def render(template: str, /, package: str = "clamp3d.output", **values: Any) -> str:
-    """Fill in one of the files in a package's ``templates``: HTML pages escape texts, a missing value is an error."""
+    """Fill in one of the files in a package's ``templates``: HTML and XML escape texts, a missing value is an error."""
     return str(_environment(package).get_template(template).render(**values))
 
 
@@ -34,14 +35,16 @@ def now() -> datetime.datetime:
 def _environment(package: str) -> Any:
     import jinja2
 
+    from clamp3d.output.palette import VERDICT_COLOURS
     from clamp3d.output.wording import counted, distance_text, first_text
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "templates"),
-        autoescape=jinja2.select_autoescape(["html"]),
+        autoescape=jinja2.select_autoescape(["html", "bcf", "bcfv"]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
     environment.globals |= {"gap": distance_text, "first_text": first_text, "counted": counted, "degrees": math.degrees}
+    environment.globals |= {"verdict_colours": VERDICT_COLOURS, "version": __version__}
     return environment

@@ -18,7 +18,7 @@ from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape, Shape
-from clamp3d.output.palette import part_colours
+from clamp3d.output.palette import PART_COLOURS, part_colours
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +94,16 @@ def place(source: Clamp | Scene, names: Iterable[str] | None = None) -> tuple[Pl
 
     Raises InputError for an unknown part or none at all.
     """
-    shapes: dict[str, tuple[Shape, Array | None, Component | None]]
     if isinstance(source, Clamp):
-        shapes = {name: (solid, None, None) for name, solid in parts(source).items()}
+        placed = [PlacedPart(name, solid, None, PART_COLOURS[name]) for name, solid in parts(source).items()]
     else:
-        shapes = {part.name: (part.shape, part.T_world, part.component) for part in source.parts}
-    available = list(shapes)
+        colours = part_colours([part.name for part in source.parts])
+        placed = [PlacedPart(p.name, p.shape, p.T_world, colours[p.name], p.component) for p in source.parts]
+    available = [part.name for part in placed]
     chosen = dict.fromkeys(available if names is None else items("names", names, "part names"))
     for name in chosen:
-        if text("each of names", name) not in shapes:
+        if text("each of names", name) not in available:
             raise InputError(unknown_part(name, available))
     if not chosen:
         raise InputError(f"names must name at least one part, available: {', '.join(available) or 'none'}")
-    colours = part_colours(available)
-    return tuple(
-        PlacedPart(name, shape, T, colours[name], component)
-        for name, (shape, T, component) in shapes.items()
-        if name in chosen
-    )
+    return tuple(part for part in placed if part.name in chosen)

@@ -208,10 +208,11 @@ def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
     on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
     result = check(scene, progress=on_stage)
     names = titles(scene)
-    rows = {id(row): PairRow.of(row) for row in result.rows}
-    shown = [(group, rows[id(group.worst)]) for group in grouped(result)]
-    findings = tuple(Finding(row.severity, group_text(group, names), row, group) for group, row in shown)
-    at_rest, moving = (tuple(rows[id(row)] for row in own) for own in (result.pairs, result.motions))
+    findings = tuple(
+        Finding(_severity(group.verdict), group_text(group, names), PairRow.of(group.worst), group)
+        for group in grouped(result)
+    )
+    at_rest, moving = (tuple(map(PairRow.of, rows)) for rows in (result.pairs, result.motions))
     return Report(scene, headline(result), result.clean, findings, at_rest, moving, result.work.pairs)
 
 

@@ -14,7 +14,7 @@ from clamp3d import __version__
 from clamp3d.output.files import write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
-from clamp3d.output.palette import DIMENSION, INK, VERDICT_COLOURS, part_colours
+from clamp3d.output.palette import DIMENSION, INK, part_colours
 from clamp3d.output.report import LISTED, SEVERITIES, PairRow, Report
 from clamp3d.output.tables import csv_table
 from clamp3d.output.wording import meanings, titles
@@ -135,7 +135,6 @@ def report_html(report: Report, *, progress: Callable[[str], None] = lambda step
         names=names,
         titles=titles(report.scene),
         colours=part_colours([part.name for part in report.scene.parts]),
-        verdict_colours=VERDICT_COLOURS,
         verdicts=meanings(report.scene),
         severities=SEVERITIES,
         cell=lambda a, b: cells.get((a, b)),

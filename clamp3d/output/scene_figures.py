@@ -145,12 +145,5 @@ def _legend(ax: Axes, solids: dict[str, PosedMesh]) -> None:
 
     if len(solids) <= 12:
         handles = [Patch(fc=solid.colour, ec=INK, lw=0.5, label=name) for name, solid in solids.items()]
-        ax.legend(
-            handles=handles,
-            loc="upper left",
-            bbox_to_anchor=(0.0, 0.0),
-            ncols=4,
-            frameon=False,
-            fontsize=8,
-            labelcolor=INK,
-        )
+        below: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0)}
+        ax.legend(handles=handles, ncols=4, frameon=False, fontsize=8, labelcolor=INK, **below)

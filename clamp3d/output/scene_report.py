@@ -9,20 +9,12 @@ from typing import Any
 
 from clamp3d import __version__
 from clamp3d.engine.allowed import Allowed
-from clamp3d.engine.result import CheckResult, Work
+from clamp3d.engine.result import CheckResult, PairResult, Work
 from clamp3d.engine.verdict import Verdict
 from clamp3d.output.baseline import Comparison, compare
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.tables import text_table
-from clamp3d.output.wording import (
-    by_group,
-    counted,
-    distance_text,
-    first_text,
-    group_text,
-    headline,
-    titles,
-)
+from clamp3d.output.wording import by_group, counted, distance_text, first_text, group_text, headline, titles
 
 _LISTED, _PAIRS, _NOTES = 60, 30, 12
 """Groups, pairs and notes that the text lists at most."""
@@ -55,13 +47,10 @@ def check_to_text(result: CheckResult, comparison: Comparison | None = None) -> 
     others = comparison.accepted.keys() - comparison.status.keys()
     lines += [f"  note: accepted, and no finding now: {', '.join(sorted(others))}"] if others else []
     if result.pairs:
-        rows = [
-            (f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance), row.distance.method)
-            for row in by_group(result, result.pairs)
-        ]
-        lines += ["", text_table(("pair", "verdict", "distance", "by"), rows[:_PAIRS], indent=2)]
-        if len(rows) > _PAIRS:
-            lines.append(f"  ... and {len(rows) - _PAIRS} more (--json or --html lists all)")
+        rows = [(*_cells(row), row.distance.method) for row in by_group(result, result.pairs)[:_PAIRS]]
+        lines += ["", text_table(("pair", "verdict", "distance", "by"), rows, indent=2)]
+        if len(result.pairs) > _PAIRS:
+            lines.append(f"  ... and {len(result.pairs) - _PAIRS} more (--json or --html lists all)")
     if result.motions:
         lines += ["", _motions(result)]
     return "\n".join([*lines, "", *work_text(result.work)])
@@ -136,19 +125,17 @@ def _cut(lines: Sequence[str], most: int, rest: str) -> list[str]:
 
 def _motions(result: CheckResult) -> str:
     head = ("motion", "pair", "verdict", "least distance", "at t", "first contact at t", "by")
-    rows = [
-        (
-            str(row.motion),
-            f"{row.a} - {row.b}",
-            row.verdict.value,
-            distance_text(row.distance),
-            "" if row.t is None else f"{row.t:.4f}",
-            "" if row.contact_at is None else first_text(row.contact_at),
-            row.distance.method,
-        )
-        for row in by_group(result, result.motions)
-    ]
+    rows = []
+    for row in by_group(result, result.motions):
+        t = "" if row.t is None else f"{row.t:.4f}"
+        contact = "" if row.contact_at is None else first_text(row.contact_at)
+        rows.append((row.motion, *_cells(row), t, contact, row.distance.method))
     return text_table(head, rows, indent=2)
+
+
+def _cells(row: PairResult) -> tuple[str, str, str]:
+    """A pair, its verdict and its distance, as both tables show them."""
+    return f"{row.a} - {row.b}", row.verdict.value, distance_text(row.distance)
 
 
 def work_text(work: Work) -> list[str]:

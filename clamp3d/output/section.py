@@ -39,7 +39,7 @@ ARROW: dict[str, Any] = {
 }
 _HATCH: dict[PartName, str] = {"P1": "////", "P2": "\\\\\\\\", "P3": "////"}
 _LINE: dict[str, Any] = {"color": DIMENSION, "lw": 0.6, "zorder": 25}
-_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26, "textcoords": "offset points"}
+_NUMBER: dict[str, Any] = {"color": DIMENSION, "fontsize": 9, "zorder": 26}
 _ORDER: tuple[PartName, ...] = ("P6", "P7", "P1", "P2", "P3", "P4", "P5")
 _CHORD_ERROR = 1e-3
 """mm by which a drawn outline may leave its arc: far below a pixel, enlarged too."""
@@ -155,10 +155,14 @@ def label_column(
             x0, y0 = points[name]
             ax.plot([x0, column], [y0, y], color=INK, lw=0.5, marker=".", markevery=[0], ms=3.5, zorder=30)
         balloon(ax, name, column, y, size=8.0)
-        ax.annotate(
-            label(clamp, name), (column, y), (13, 0), textcoords="offset points", va="center", fontsize=8, color=INK
-        )
+        note(ax, label(clamp, name), (column, y), (13, 0), va="center")
         ax.update_datalim([(column, y)])
+
+
+def note(ax: Axes, text: str, at: Point, offset: Point = (0.0, 0.0), **style: Any) -> None:
+    """A text in ink at a point of the axes, or as ``style`` says, ``offset`` (pt) to the right and up of it."""
+    look: dict[str, Any] = {"color": INK, "fontsize": 8, **style}
+    ax.annotate(text, at, offset, textcoords="offset points", **look)
 
 
 def label(clamp: Clamp, name: PartName) -> str:
@@ -227,7 +231,7 @@ def _dimension(ax: Axes, above: Point, below: Point, x: float, side: int) -> Non
         ax.annotate("", (x, tip), (x, tail), arrowprops=ARROW)
     at = (x + 2.0 * side, 0.5 * (top + bottom))
     align = "right" if side < 0 else "left"
-    ax.annotate(f"{below[1] - above[1]:.3f}", at, (3 * side, 0), ha=align, va="center", **_NUMBER)
+    note(ax, f"{below[1] - above[1]:.3f}", at, (3 * side, 0), ha=align, va="center", **_NUMBER)
 
 
 def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
@@ -236,7 +240,7 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     inward = 1.0 if pose.angle >= 0.0 else -1.0  # the lower corner is on the left if the tilt is positive
     corner = pose.point(-inward * down.width / 2, down.underside_depth)
     if abs(math.degrees(pose.angle)) < 5e-3:
-        ax.annotate("parallel", corner, (0, -11), va="center", **_NUMBER)
+        note(ax, "parallel", corner, (0, -11), va="center", **_NUMBER)
         return
     reach = inward * 0.19 * down.width
     ax.plot(corner[0] + reach * np.array([-0.06, 1.15]), [corner[1]] * 2, ls=(0, (8, 2, 1, 2)), **_LINE)
@@ -244,4 +248,4 @@ def _draw_tilt(ax: Axes, clamp: Clamp, pose: SectionPose) -> None:
     ax.plot(corner[0] + reach * np.cos(t), corner[1] - reach * np.sin(t), **_LINE)
     at = (corner[0] + 0.45 * reach, max(corner[1], corner[1] - reach * math.sin(pose.angle)))
     text = f"{abs(math.degrees(pose.angle)):.2f}\N{DEGREE SIGN}"
-    ax.annotate(text, at, (0, -10), ha="center", va="center", **_NUMBER)
+    note(ax, text, at, (0, -10), ha="center", va="center", **_NUMBER)

@@ -29,16 +29,24 @@ from clamp3d.errors import Clamp3dError, InputError
 
 PORT, PORTS = 7000, 200
 """First port tried, meshcat's own, and how many are tried; unless the user named one."""
+FRONT = 10
+"""Render order of what is drawn over the solids; labels come after it."""
 _TIMEOUT = 10.0  # s for an answer of a meshcat server, and for new commands of a page
 
 Command = dict[str, Any]
 Answer = Callable[[Mapping[str, str]], str | dict[str, Any]]
 
 
+def server_at(url: str | None, host: str, port: int | None) -> PageServer | MeshcatServer:
+    """The meshcat server at ``url``, where that is given, else one of our own. Raises InputError, Clamp3dError."""
+    return PageServer(host, port) if url is None else MeshcatServer(url)
+
+
 class CommandLog:
     """The commands that still matter, in order: a later one replaces an earlier one of the same kind at its place.
 
-    The geometry of objects is a command of its own, which our page knows: it is kept once, however many have it.
+    The geometry of objects is a command of its own, which our page knows: it is kept once, however many have it. A
+    meshcat `Visualizer` takes the log for its window; what it sends goes on to the ``server`` too, if there is one.
 
     >>> log = CommandLog()
     >>> for x in (1.0, 2.0):
@@ -47,10 +55,20 @@ class CommandLog:
     (1, 1, 0)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, server: MeshcatServer | None = None) -> None:
+        self._server = server
         self._messages: dict[tuple[str, str, str], tuple[int, str]] = {}
         self._count = 0
         self._changed = threading.Condition()
+
+    def send(self, command: Any) -> None:
+        """Keep a command of meshcat, and pass it on; what is seen through the solids is drawn after them."""
+        data: Command = command.lower()
+        if data["type"] == "set_object" and not data["object"]["materials"][0].get("depthTest", True):
+            data["object"]["object"].setdefault("renderOrder", FRONT)
+        self.add(data)
+        if self._server is not None:
+            self._server.send(data)
 
     def add(self, command: Command) -> None:
         """Keep ``command``."""

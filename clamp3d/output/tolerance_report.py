@@ -11,10 +11,10 @@ from clamp3d.clamp.sensitivity import DIMENSIONS, Sensitivity
 from clamp3d.clamp.tolerance import MonteCarlo
 from clamp3d.output.figures import blank
 from clamp3d.output.palette import INK
+from clamp3d.output.section import note
 from clamp3d.output.tables import text_table
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PERCENTILES = (0.1, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 99.9)
@@ -86,13 +86,15 @@ def histogram_figure(result: MonteCarlo) -> Figure:
     if m:
         axes.hist(result.clamped, bins=min(80, max(5, round(2.0 * m ** (1 / 3)))), color="#56B4E9", edgecolor="white")
         axes.set_ylim(0.0, 1.22 * axes.get_ylim()[1])
-        low, median, high = result.percentiles((5.0, 50.0, 95.0))
-        for name, value in (("5 % below", low), ("median", median), ("95 % below", high)):
+        by_height: Any = ("data", "axes fraction")
+        names = ("5 % below", "median", "95 % below")
+        for name, value in zip(names, result.percentiles((5.0, 50.0, 95.0)), strict=True):
             axes.axvline(value, color=INK, linestyle=(0, (4, 3)), linewidth=1.3)
-            _name(axes, f"{name} {value:.3f}", value, 0.88, 4, "left")
+            note(axes, f"{name} {value:.3f}", (value, 0.88), (4, 0), xycoords=by_height, ha="left")
         if result.nominal is not None:
             axes.axvline(result.nominal, color="#D55E00", linewidth=1.3)
-            _name(axes, f"nominal {result.nominal:.3f}", result.nominal, 0.95, -4, "right")
+            text, at = f"nominal {result.nominal:.3f}", (result.nominal, 0.95)
+            note(axes, text, at, (-4, 0), xycoords=by_height, ha="right")
     else:
         axes.text(0.5, 0.5, "no sample clamps", transform=axes.transAxes, ha="center")
     axes.set(xlabel="splint distance (mm)", ylabel="clamps")
@@ -100,8 +102,3 @@ def histogram_figure(result: MonteCarlo) -> Figure:
     heading = f"{result.spec.clamp.name}: {n} clamps within tolerances, {n - m} not clamped (seed {result.spec.seed})"
     axes.set_title(heading, fontsize=10)
     return figure
-
-
-def _name(axes: Axes, text: str, x: float, height: float, offset: int, align: str) -> None:
-    place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": align}
-    axes.annotate(text, (x, height), (offset, 0), fontsize=8, color=INK, **place)

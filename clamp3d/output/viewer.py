@@ -16,7 +16,6 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from clamp3d import __version__
 from clamp3d.checks import instance, number
 from clamp3d.clamp.forces import HELD
 from clamp3d.clamp.result import Assembly, Waypoint
@@ -28,7 +27,7 @@ from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
 from clamp3d.output.scene_report import work_text
-from clamp3d.output.serving import Command, CommandLog, MeshcatServer, PageServer
+from clamp3d.output.serving import CommandLog, MeshcatServer, PageServer, server_at
 from clamp3d.output.viewer_scene import Pieces, SceneDrawing
 from clamp3d.output.viewer_story import LISTED, ClampStory, Stop, Story, findings_of, findings_of_clamp
 from clamp3d.output.wording import by_group, headline, meanings, severity, titles
@@ -71,14 +70,14 @@ class Viewer(AbstractContextManager["Viewer"]):
         overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
         self._source = shown if isinstance(shown, ClampStory) else Story(shown)
-        self._server, self._log = server, CommandLog()
+        self._server = server
+        self._log = CommandLog(server if isinstance(server, MeshcatServer) else None)
         self._mesh_error, self._overlays = mesh_error, overlays or {}
         self._rows: dict[tuple[str, str], PairResult] = {}
         self._looked = -math.inf
-        self._panel = ""
-        self._drawing = SceneDrawing(self._source, self._send, mesh_error, self._overlays)
+        self._drawing = SceneDrawing(self._source, self._log, mesh_error, self._overlays)
         self.story: dict[str, Any] = {}
-        """What the page shows, as data: stops with their rows (distances in mm), findings, parts."""
+        """What the page shows, as data: stops with their rows (distances in mm), findings, parts; the panel as HTML."""
         self._tell(self._source.waiting, "waiting")
         if isinstance(server, PageServer):
             server.start(lambda: self._page([]), self._log, self.answer)
@@ -120,7 +119,8 @@ class Viewer(AbstractContextManager["Viewer"]):
             state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
             notes = [finding.text for finding in result.findings if finding.severity == "note"]
             findings = findings_of_clamp(result, drawing.timeline, drawing.extent(drawing.timeline.stops[-1].poses))
-            self._tell(result.status, state, findings, done=True, assembly=result, forces=forces, notes=notes)
+            words = {"assembly": result, "forces": [force.to_dict() for force in forces], "notes": notes}
+            self._tell(result.status, state, findings, done=True, **words)
         else:
             for stop in self._source.stops(result):
                 drawing.show(stop)
@@ -153,12 +153,11 @@ class Viewer(AbstractContextManager["Viewer"]):
             pair = {"a": finding["a"], "b": finding["b"]}
             rows = [self.answer(pair | {"time": str(s)})["rows"][0] for s in finding["moments"]]
             self.story["curves"][str(k)] = [[row["at_least_mm"], row["at_most_mm"]] for row in rows]
-        self._send_story()
+        self._keep_story()
         return self._page(self._log.messages())
 
     def _page(self, messages: list[str]) -> str:
-        title, done = self.story["title"], self.story["done"]
-        return render("viewer.html", title=title, panel=self._panel, done=done, messages=messages, **_meshcat_script())
+        return render("viewer.html", **self.story, messages=messages, **_meshcat_script())
 
     def save_html(self, path: str | Path) -> None:
         """Write `html` to a file. Raises InputError if it cannot be written."""
@@ -172,13 +171,8 @@ class Viewer(AbstractContextManager["Viewer"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _send(self, command: Command) -> None:
-        self._log.add(command)
-        if isinstance(self._server, MeshcatServer) and command["type"] != "set_story":
-            self._server.send(command)
-
-    def _send_story(self) -> None:
-        self._send({"type": "set_story", "path": "", "value": self.story | {"panel": self._panel}})
+    def _keep_story(self) -> None:
+        self._log.add({"type": "set_story", "path": "", "value": self.story})
 
     @property
     def _accuracy(self) -> str:
@@ -192,38 +186,36 @@ class Viewer(AbstractContextManager["Viewer"]):
         """Set what the page beside the picture shows; ``more`` is for its panel only."""
         source, drawing = self._source, self._drawing
         stops = [_stop_data(stop, drawing) for stop in drawing.timeline.stops]
-        self.story = {
+        story: dict[str, Any] = {
             "title": source.title,
             "headline": text,
             "done": done,
             "stops": stops,
             "findings": [drawing.with_margin(finding) for finding in itertools.islice(findings, LISTED)],
             "curves": {},
-            "forces": [force.to_dict() for force in more.get("forces", ())],
+            "forces": more.get("forces", []),
             "paths": drawing.paths,
             "overlays": list(self._overlays),
             "uncut": None if source.anchors is None else _UNCUT,
             "facets": self._mesh_error,
             "frame": drawing.framed(),
         }
-        numbered = enumerate(self.story["findings"])
+        numbered = enumerate(story["findings"])
         used = {row["verdict"] for stop in stops for row in stop["rows"]}
         words = meanings(source.scene)
         context = {
-            **{"assembly": None, "forces": (), "pairs": (), "motions": (), "notes": ()},
+            **{"assembly": None, "pairs": (), "motions": (), "notes": ()},
             "source": source,
             "drawing": drawing,
             "state": state,
             "accuracy": self._accuracy,
             "parts": titles(source.scene),
-            "colours": VERDICT_COLOURS,
             "force_colour": FORCE,
             "meanings": {name: words[name] for name in VERDICT_COLOURS if name in used},
             "groups": [list(members) for _, members in itertools.groupby(numbered, lambda pair: pair[1]["group"])],
-            "version": __version__,
         }
-        self._panel = render("viewer.panel.html", **(self.story | context | more))
-        self._send_story()
+        self.story = story | {"panel": render("viewer.panel.html", **(story | context | more))}
+        self._keep_story()
 
 
 def view(
@@ -273,7 +265,7 @@ def view(
     if isinstance(result, Scene):
         result = check(result)
     source = ClampStory(result.clamp, result.model) if isinstance(result, Assembly) else result.scene
-    server = MeshcatServer(url) if url is not None else PageServer(host, port) if serve else None
+    server = server_at(url, host, port) if serve or url is not None else None
     try:
         viewer = Viewer(source, server, mesh_error=mesh_error, overlays=overlays)
         viewer.finish(result)

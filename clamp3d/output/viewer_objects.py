@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 
 from clamp3d.geometry.pose import Array
 from clamp3d.output.palette import INK
+from clamp3d.output.serving import FRONT
 
 _CREASE = math.radians(25.0)
 """Faces that meet at less are shaded as one round surface; sharper edges are drawn as lines."""
-FRONT = 10
-"""Render order of what is drawn over the solids; labels come after it."""
 _SHADES = 32
 """Colours of a label's picture: its two, and what is between them at their edges."""
 

@@ -7,8 +7,9 @@ pieces of a baseline); ``contacts``, ``gaps`` and ``forces`` hold a group for ea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from clamp3d.geometry.pose import Array, to_target, translation
 from clamp3d.output import viewer_objects as draw
 from clamp3d.output.palette import FORCE, INK, VERDICT_COLOURS, darker
 from clamp3d.output.placed import overlap, place, posed
-from clamp3d.output.serving import Command
+from clamp3d.output.serving import CommandLog
 from clamp3d.output.viewer_story import Poses, Row, Stop, Story, Timeline, focus
 
 Pieces = Mapping[str, Sequence[trimesh.Trimesh]]
@@ -46,31 +47,12 @@ _FORCE, _SHAFT = 0.2, 0.008
 _OVERLAY_COLOURS = ("#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377")  # Tol's bright scheme
 
 
-class _Window:
-    """Where a `Visualizer` sends its commands: what is to be seen through the solids is drawn after them."""
-
-    def __init__(self, send: Callable[[Command], None]) -> None:
-        self._send = send
-
-    def send(self, command: Any) -> None:
-        data: Command = command.lower()
-        if data["type"] == "set_object" and not data["object"]["materials"][0].get("depthTest", True):
-            data["object"]["object"].setdefault("renderOrder", draw.FRONT)
-        self._send(data)
-
-
 class SceneDrawing:
-    """Sends a story's parts to ``send`` at once, each stop of its time line by `show`, and the animation at the end."""
+    """Sends a story's parts to ``log`` at once, each stop of its time line by `show`, and the animation at the end."""
 
-    def __init__(
-        self,
-        story: Story,
-        send: Callable[[Command], None],
-        mesh_error: float,
-        overlays: Mapping[str, Pieces],
-    ) -> None:
-        self._send, self._eye = send, np.array(_CORNER if story.anchors is None else _FRONT)
-        self._world = Visualizer.view_into(_Window(send), Path())
+    def __init__(self, story: Story, log: CommandLog, mesh_error: float, overlays: Mapping[str, Pieces]) -> None:
+        self._eye = np.array(_CORNER if story.anchors is None else _FRONT)
+        self._world = Visualizer.view_into(log, Path())
         self._root = self._world["clamp3d"]
         placed = place(story.scene)
         self._meshes = dict(zip((part.name for part in placed), posed(placed, mesh_error), strict=True))
@@ -132,8 +114,9 @@ class SceneDrawing:
         if len(self.timeline.stops) > 1:
             # A meshcat server sends the scene node by node to a page that connects later: at the root the animation
             # would be first, and the transforms after it would take the parts back to the start of what already plays.
-            animation = SetAnimation(self.timeline.animation(self._root, self.paths, _MARKS))
-            self._send(animation.lower() | {"path": self._root["animation"].path.lower()})
+            animation = SetAnimation(self.timeline.animation(self._root, self.paths, _MARKS)).lower()
+            animation["path"] = self._root["animation"].path.lower()
+            self._world.window.send(SimpleNamespace(lower=lambda: animation))
 
     def frame(self, low: Array, high: Array) -> None:
         """Put the camera in front of a box."""

@@ -32,14 +32,7 @@ from clamp3d.output.groups import grouped
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.section import Poses as SectionPoses
 from clamp3d.output.section import edge_openings, part_anchor
-from clamp3d.output.wording import (
-    by_group,
-    circumstances,
-    distance_text,
-    first_text,
-    sentence,
-    titles,
-)
+from clamp3d.output.wording import by_group, circumstances, distance_text, first_text, sentence, titles
 
 Poses: TypeAlias = Mapping[str, Array]
 Pair: TypeAlias = tuple[str, str]

@@ -16,7 +16,7 @@ from clamp3d.clamp.dimensions import Limits
 from clamp3d.clamp.friction import MARGIN, Balance, FrictionBand
 from clamp3d.clamp.section import SIZE, D, S, Section
 from clamp3d.clamp.torque import tighten, torque_per_newton
-from clamp3d.output.forces_report import measured_to_text
+from clamp3d.output.run_report import measured_to_text
 from tests.clamp.random_clamps import changed
 
 REFERENCE = load_clamp()
