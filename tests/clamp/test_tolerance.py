@@ -33,19 +33,12 @@ def test_derivatives_are_the_solvers_differences(line, jumper, play):
     near = solve_final_state(Section(clamp, Cas()))
     carrying = {f for f, force in zip(near.gaps.feature, near.multipliers, strict=True) if force > 0.0}
     assert any(f.startswith("lip") for f in carrying) == (line is not None)
-    h = 2e-3
+    h = 5e-4
     for name in DIMENSIONS:
         value = dimension(clamp, name)
-        wide, narrow = (
-            (
-                _distance(with_dimensions(clamp, {name: value + e}), near)
-                - _distance(with_dimensions(clamp, {name: value - e}), near)
-            )
-            / (2 * e)
-            for e in (h, h / 2)
-        )
+        low, high = (_distance(with_dimensions(clamp, {name: value + e}), near) for e in (-h, h))
         derivative = rows[name].derivative if name in rows else 0.0
-        assert derivative == pytest.approx((4 * narrow - wide) / 3, rel=1e-5, abs=1e-8), name
+        assert derivative == pytest.approx((high - low) / (2.0 * h), rel=1e-5, abs=1e-8), name
 
 
 def test_a_state_that_is_not_isolated_has_no_derivatives():
@@ -54,17 +47,17 @@ def test_a_state_that_is_not_isolated_has_no_derivatives():
 
 
 def test_samples_do_not_depend_on_where_they_run(monkeypatch):
-    monkeypatch.setattr(montecarlo, "CHUNK", 3)
+    monkeypatch.setattr(montecarlo, "CHUNK", 2)
     clamp = load_clamp()
-    alone = monte_carlo(clamp, n=4, seed=5)
-    assert monte_carlo(clamp, n=4, seed=5, processes=2).distance.tobytes() == alone.distance.tobytes()
-    assert monte_carlo(clamp, n=2, seed=5).distance.tolist() == alone.distance[:2].tolist()
-    assert monte_carlo(clamp, n=2, seed=6).distance.tolist() != alone.distance[:2].tolist()
+    alone = monte_carlo(clamp, n=3, seed=5)
+    assert monte_carlo(clamp, n=3, seed=5, processes=2).distance.tobytes() == alone.distance.tobytes()
+    assert monte_carlo(clamp, n=1, seed=5).distance.tolist() == alone.distance[:1].tolist()
+    assert monte_carlo(clamp, n=1, seed=6).distance.tolist() != alone.distance[:1].tolist()
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
     ) as cluster:
-        there = monte_carlo(clamp, n=4, seed=5, scheduler=cluster.scheduler_address)
+        there = monte_carlo(clamp, n=3, seed=5, scheduler=cluster.scheduler_address)
     assert there.distance.tobytes() == alone.distance.tobytes()
     assert there.status == alone.status
 

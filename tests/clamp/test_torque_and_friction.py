@@ -223,7 +223,8 @@ def test_command_refuses_a_value_before_it_prints_anything(arguments, message, m
 
 def test_command(finder, monkeypatch, main):
     monkeypatch.setattr("clamp3d.clamp.friction.FrictionBand", lambda _: finder)  # with its own: docs/usage.md
-    code, out, _ = main("run", "--quiet", "--no-equilibria", "--torque", "80", "--measured", "31.63", "--json", "-")
+    asked = ("--torque", "80", "--measured", "31.63", "--groove-friction", "0.1")
+    code, out, _ = main("run", "--quiet", "--no-equilibria", *asked, "--json", "-")
     data = json.loads(out)
     assert (code, data["torque"]["torque_nm"]) == (0, 80.0)
     assert data["friction_band"]["measured"]["least_friction"] == pytest.approx(0.1056, abs=1e-4)

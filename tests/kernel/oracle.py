@@ -1,12 +1,9 @@
 """Signed distances of a cylinder from a groove to 25 digits, by search instead of formulas: ``oracle.json``.
 
-Nothing here knows which features can be nearest. The signed distance of a *point* from the groove's material follows
-from the definition of its boundary (an arc and two half-lines, swept); the axis is searched for the least of it by
-branch and bound with the Lipschitz constant 1 (float64), and the brackets that survive are refined by golden section
-with 50 digits. Run: ``python -m tests.kernel.oracle``.
+The search is that of ``clamp3d stress``, which does not know which features can be nearest. Another search of the same
+kind made the file. Values anew: ``python -m tests.kernel.oracle``.
 """
 
-import itertools
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +11,13 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 
+from clamp3d.bench.stress.poses.cases import Cases, Shapes
+from clamp3d.bench.stress.poses.truth import truth_50_digits
 from clamp3d.geometry.primitives import Capsule, SweptArc
 from clamp3d.testing import body
 
 DATA = Path(__file__).parent / "data" / "oracle.json"
 mp.mp.dps = 50
-GOLDEN = (mp.sqrt(5) - 1) / 2
 
 
 def point_distance(P, R, half, H):
@@ -27,83 +25,15 @@ def point_distance(P, R, half, H):
     return body(SweptArc(R, half, 2.0 * H)).field(P)
 
 
-def exact_point_distance(x, y, z, R, half, H):
-    """The same with 50 digits, written anew."""
-    mx, my = R * mp.sin(half), -R * mp.cos(half)
-    rho = mp.hypot(x, y)
-    lips = mp.hypot(abs(x) - mx, y - my)
-    arc = abs(rho - R) if mp.atan2(abs(x), -y) <= half else lips
-    flat = abs(y - my) if abs(x) >= mx else lips
-    edge = min(arc, flat)
-    along = abs(z) - H
-    if y <= my and rho >= R:
-        return -min(edge, -along) if along <= 0 else along
-    return mp.hypot(edge, along) if along > 0 else edge
+def cases_of(groove, wire, poses):
+    """A case for each pose (n, 4, 4), of which only the place and the z axis count."""
+    shapes = Shapes(*np.array([[groove.radius, groove.half_angle, groove.length, wire.radius, wire.length]]).T)
+    return Cases(shapes, np.zeros(len(poses), dtype=int), np.asarray(poses), np.full(len(poses), np.nan))
 
 
-def brackets(R, half, H, length, c, d):
-    """Stretches of the axis, as (lo, hi), that may hold the least distance."""
-    t = np.linspace(-length / 2, length / 2, 129)
-    f = point_distance(c + t[:, None] * d, R, half, H)
-    a, b, fa, fb = t[:-1], t[1:], f[:-1], f[1:]
-    best = f.min()
-    scale = R + length + np.abs(c).max()
-    for _ in range(20):
-        keep = (fa + fb - (b - a)) / 2 < best + 1e-14 * scale
-        a, b, fa, fb = a[keep], b[keep], fa[keep], fb[keep]
-        if len(a) > 4096:
-            break
-        m = (a + b) / 2
-        fm = point_distance(c + m[:, None] * d, R, half, H)
-        best = min(best, fm.min())
-        a, b, fa, fb = np.r_[a, m], np.r_[m, b], np.r_[fa, fm], np.r_[fm, fb]
-    order = np.argsort(a)
-    a, b = a[order], b[order]
-    # Neighbours make one stretch; a long one is cut in eight.
-    cuts = np.flatnonzero(a[1:] > b[:-1] + 1e-12 * length)
-    starts, stops = a[np.r_[0, cuts + 1]], b[np.r_[cuts, len(b) - 1]]
-    out = []
-    for lo, hi in zip(starts, stops, strict=True):
-        parts = 12 if hi - lo > 1e-3 * length else 1
-        edges = np.linspace(lo, hi, parts + 1)
-        out += itertools.pairwise(edges)
-    return out
-
-
-def exact_distance(R, half, length_groove, r, length, c, d, digits=25):
-    """Least signed distance of the axis, minus r. ``c`` and ``d`` are mpf triples, ``d`` a unit vector."""
-    cf, df = np.array([float(v) for v in c]), np.array([float(v) for v in d])
-    Rm, hm, Hm = mp.mpf(R), mp.mpf(half), mp.mpf(length_groove) / 2
-    end = mp.mpf(length) / 2
-
-    def f(t):
-        return exact_point_distance(c[0] + t * d[0], c[1] + t * d[1], c[2] + t * d[2], Rm, hm, Hm)
-
-    best = min(f(-end), f(end))
-    for lo, hi in brackets(R, half, length_groove / 2, length, cf, df):
-        pad = mp.mpf(max(hi - lo, 1e-9 * length)) / 4
-        a, b = max(-end, mp.mpf(lo) - pad), min(end, mp.mpf(hi) + pad)
-        m1, m2 = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        f1, f2 = f(m1), f(m2)
-        while b - a > mp.mpf(10) ** -20 * length:
-            if f1 <= f2:
-                b, m2, f2 = m2, m1, f1
-                m1 = b - GOLDEN * (b - a)
-                f1 = f(m1)
-            else:
-                a, m1, f1 = m1, m2, f2
-                m2 = a + GOLDEN * (b - a)
-                f2 = f(m2)
-        best = min(best, f1, f2)
-    return mp.nstr(best - mp.mpf(r), digits)
-
-
-def axis_of(T):
-    """Centre and unit direction of a pose's z axis, from its float64 entries exactly."""
-    c = [mp.mpf(float(v)) for v in T[:3, 3]]
-    d = [mp.mpf(float(v)) for v in T[:3, 2]]
-    n = mp.sqrt(sum(v * v for v in d))
-    return c, [v / n for v in d]
+def exact_distance(groove, wire, T):
+    """The signed distance with 50 digits."""
+    return mp.mpf(truth_50_digits(cases_of(groove, wire, [T]), 0))
 
 
 @dataclass(frozen=True)
@@ -147,9 +77,8 @@ def axis_distance(cylinder: Capsule, pose: np.ndarray, points: np.ndarray) -> np
 def main():
     """The values anew, of the inputs that the file holds."""
     rows = json.loads(DATA.read_text())
-    for row in rows:
-        R, half, L, r, length, *pose = map(float.fromhex, row[1])
-        row[2] = exact_distance(R, half, L, r, length, *axis_of(np.reshape(pose, (3, 4))))
+    for row, case in zip(rows, load(), strict=True):
+        row[2] = mp.nstr(exact_distance(case.groove, case.cylinder, case.pose), 25)
     DATA.write_text("[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n")
 
 

@@ -6,13 +6,14 @@ import numba
 import numpy as np
 import pytest
 
+from clamp3d.bench.stress.poses.truth import truth
 from clamp3d.errors import InputError
 from clamp3d.kernel import Capsule, Cylinder, SweptArc, features, nearest, rotation, translation
 from clamp3d.kernel.distance import Feature, signed_distance, signed_distances
 from clamp3d.kernel.relation import relative_pose
 from clamp3d.kernel.vector import Vector
 from clamp3d.testing import body
-from tests.kernel.oracle import axis_distance, axis_of, exact_distance, load, surface_distance
+from tests.kernel.oracle import axis_distance, cases_of, exact_distance, load, surface_distance
 from tests.refusals import refusals
 
 CASES = load()
@@ -33,12 +34,9 @@ def test_worst_errors_per_feature():
 
 def test_oracle_is_what_its_script_makes():
     # The committed values are those of the search, not of the code under test.
-    mp.mp.dps = 50
     for case in CASES[:: len(CASES) // 10]:
-        g, w = case.groove, case.cylinder
-        c, d = axis_of(case.pose)
-        value = exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, c, d)
-        assert abs(mp.mpf(value) - mp.mpf(case.value)) < mp.mpf(10) ** -18 * case.size
+        value = exact_distance(case.groove, case.cylinder, case.pose)
+        assert abs(value - mp.mpf(case.value)) < mp.mpf(10) ** -18 * case.size
 
 
 @pytest.mark.parametrize("wire", [Capsule(10.5, 80.0), Cylinder(10.5, 80.0), Cylinder(10.5, 4.0)])
@@ -71,11 +69,10 @@ def test_an_axis_that_is_exactly_along_an_edge(axis):
     """Beyond an end and beside it: lines that are parallel have no nearest point of their own."""
     rng = np.random.default_rng(3)
     groove, wire = SweptArc(8.0, 0.4, 16.0), Capsule(2.5, 3.0)
-    for centre in rng.uniform(-16.0, 16.0, (8, 3)):
-        answer = signed_distances(groove, wire, np.array([[centre, axis]]), full=True)
-        mp.mp.dps = 50
-        value = exact_distance(8.0, 0.4, 16.0, 2.5, 3.0, [mp.mpf(x) for x in centre], [mp.mpf(x) for x in axis])
-        assert abs(float(answer.distance[0] - mp.mpf(value))) < 1e-13, centre
+    places = np.stack([rng.uniform(-16.0, 16.0, (8, 3)), np.tile(axis, (8, 1))], axis=1)
+    poses = np.tile(np.eye(4), (8, 1, 1))
+    poses[:, :3, 2:] = places[:, ::-1].transpose(0, 2, 1)
+    assert np.abs(signed_distances(groove, wire, places) - truth(cases_of(groove, wire, poses))).max() < 1e-13
 
 
 def test_witnesses_lie_on_both_surfaces_and_moving_by_the_distance_makes_them_touch():
@@ -96,7 +93,6 @@ def test_witnesses_lie_on_both_surfaces_and_moving_by_the_distance_makes_them_to
 
 
 def test_world_offsets_cost_nothing():
-    mp.mp.dps = 50
     rng = np.random.default_rng(5)
     for case in CASES[::60]:
         A = rotation(rng.normal(size=3), 1.0)
@@ -105,12 +101,10 @@ def test_world_offsets_cost_nothing():
         # The exact relative pose of the two float64 world poses.
         Am, Bm = mp.matrix(A[:3].tolist()), mp.matrix(B[:3].tolist())
         R = Am[:, :3].T
-        c, d = R * (Bm[:, 3] - Am[:, 3]), R * Bm[:, 2]
-        n = mp.norm(d)
-        g, w = case.groove, case.cylinder
-        exact = exact_distance(g.radius, g.half_angle, g.length, w.radius, w.length, list(c), list(d / n))
-        answer = signed_distance(g, w, relative_pose(A, B))
-        assert abs(mp.mpf(answer.distance) - mp.mpf(exact)) <= 1e-12 * case.size
+        T = np.eye(4)
+        T[:3, 2:] = np.column_stack([R * Bm[:, 2], R * (Bm[:, 3] - Am[:, 3])])
+        answer = signed_distance(case.groove, case.cylinder, relative_pose(A, B))
+        assert abs(answer.distance - truth(cases_of(case.groove, case.cylinder, [T]))[0]) <= 1e-12 * case.size
 
 
 def test_tiny_and_huge_numbers():

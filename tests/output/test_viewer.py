@@ -41,7 +41,7 @@ def commands_of(viewer):
 def test_text_and_page_print_the_same_tilt_and_no_negative_zero(tmp_path):
     for wires, tilt in ((dict(jumper=40), "-3.53"), (dict(line=5, jumper=5), "0.00")):
         assembly = assemble("reference", **wires)
-        view(assembly, serve=False).save_html(tmp_path / "page.html")
+        view(assembly, serve=False, mesh_error=0.5).save_html(tmp_path / "page.html")
         assert f" tilt {tilt} deg" in run_to_text(assembly)
         assert f"tilt of the down splint {tilt}&deg;" in (tmp_path / "page.html").read_text()
 

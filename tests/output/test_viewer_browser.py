@@ -113,9 +113,27 @@ def hinge_page(saved, hinge):
 
 
 @pytest.fixture(scope="module")
-def dark_phone(saved, hinge):
+def turned(hinge_page, hinge):
+    """The last finding, picked on that page by its address, seen from elsewhere: identifier, camera, address."""
+    group, page = grouped(hinge)[-1], hinge_page
+    page.evaluate("id => { location.hash = 'finding=' + id; }", group.id)
+    wait_for(page, f"document.querySelector('.finding.now')?.dataset.id === '{group.id}'")
+    settle(page)
+    page.mouse.move(800, 300)
+    page.mouse.down()
+    page.mouse.move(900, 340)
+    page.mouse.up()
+    settle(page)
+    return group.id, camera(page), page.evaluate("location.hash")
+
+
+@pytest.fixture(scope="module")
+def dark_phone(saved, hinge, turned):
+    """A phone that has opened this address, and what it showed first."""
     size = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
-    return saved(hinge, color_scheme="dark", **size)
+    page = saved(hinge, turned[2], color_scheme="dark", **size)
+    page.first = page.get_attribute(".finding.now", "data-id"), camera(page)
+    return page
 
 
 @pytest.fixture(scope="module")
@@ -311,17 +329,16 @@ def test_a_screen_reader_can_name_everything(hinge_page):
 def test_page_of_a_fit_follows_the_scheme(opened, tmp_path):
     path = tmp_path / "fit.html"
     path.write_text(fit_to_html(fit_mesh(faceted_shape(shapes.cylinder(5.0, 20.0), 0.1).mesh)), encoding="utf-8")
-    page = opened(path.as_uri(), offline=True)
-    corner = page.locator("#view").bounding_box()
     for scheme in ("light", "dark"):
-        page.emulate_media(color_scheme=scheme)
-        page.reload()
+        page = opened(path.as_uri(), offline=True, color_scheme=scheme)
         settle(page)
+        corner = page.locator("#view").bounding_box()
         image = pixels(page)
         for x, y in ((5, 5), (int(corner["x"]) + 5, int(corner["y"]) + 5)):  # the page, and behind the part
             assert image[y, x].min() > 200 if scheme == "light" else image[y, x].max() < 70
         for selector in ("h1", "p", "td", "th", "dd", ".pm"):
             assert contrast(page, selector) > 4.5, (scheme, selector)
+        page.context.close()
 
 
 def contrast(page, selector):
@@ -540,21 +557,10 @@ def test_a_part_can_be_named_isolated_ghosted_and_hidden(sliding_page):
     assert opacity(page, "still") == 0.0
 
 
-def test_the_address_names_the_finding_and_the_camera(saved, hinge_page, hinge):
-    group = grouped(hinge)[-1]
-    page = hinge_page
-    page.evaluate("id => { location.hash = 'finding=' + id; }", group.id)
-    wait_for(page, f"document.querySelector('.finding.now')?.dataset.id === '{group.id}'")
-    settle(page)
-    page.mouse.move(800, 300)
-    page.mouse.down()
-    page.mouse.move(900, 340)
-    page.mouse.up()
-    settle(page)
-    seen, fragment = camera(page), page.evaluate("location.hash")
-    again = saved(hinge, fragment)
-    assert again.get_attribute(".finding.now", "data-id") == group.id
-    np.testing.assert_allclose(camera(again), seen, atol=1e-3)
+def test_the_address_names_the_finding_and_the_camera(turned, dark_phone):
+    (finding, seen), (finding_there, seen_there) = turned[:2], dark_phone.first
+    assert finding_there == finding
+    np.testing.assert_allclose(seen_there, seen, atol=1e-3)
 
 
 def test_the_list_holds_the_findings_of_a_part(hinge_page, hinge):

@@ -5,7 +5,7 @@ import numpy as np
 
 from clamp3d.bench.compare.scene import BANDS, CLEAR, GROOVE, OVERLAP, WIRE, known_poses
 from clamp3d.geometry.pose import check_pose
-from tests.kernel import oracle
+from tests.kernel.oracle import exact_distance
 
 POSES = known_poses()
 
@@ -43,7 +43,6 @@ def test_parallel_distances_are_the_closed_form_at_50_digits():
 
 def test_tilted_distances_are_those_of_the_search():
     for i in np.flatnonzero(~POSES.parallel)[::52]:
-        c, d = oracle.axis_of(POSES.T[i])
-        value = oracle.exact_distance(GROOVE.radius, GROOVE.half_angle, GROOVE.length, WIRE.radius, WIRE.length, c, d)
+        value = exact_distance(GROOVE, WIRE, POSES.T[i])
         stored = mpmath.mpf(float(POSES.distance[i])) + mpmath.mpf(float(POSES.residual[i]))
-        assert abs(mpmath.mpf(value) - stored) < mpmath.mpf(10) ** -22
+        assert abs(value - stored) < mpmath.mpf(10) ** -22
