@@ -1,5 +1,7 @@
 """Tables of what is refused."""
 
+from functools import partial
+
 import pytest
 
 from clamp3d import InputError
@@ -15,3 +17,8 @@ def refusals(*cases):
         assert "\n" not in str(refused.value)
 
     return test
+
+
+def refusals_of(call, *cases):
+    """The same of one call with each case's value."""
+    return refusals(*((partial(call, value), words) for value, words in cases))
