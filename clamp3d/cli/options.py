@@ -110,7 +110,7 @@ def _of_type(annotation: Any) -> dict[str, Any]:
     if get_origin(annotation) in (Union, UnionType):
         annotation = get_args(annotation)[0]  # ``X | None``
     if get_origin(annotation) is Literal:
-        return {"type": click.Choice(get_args(annotation))}
+        return {"type": click.Choice(get_args(annotation), case_sensitive=False)}
     usual: dict[Any, dict[str, Any]] = {
         bool: {"is_flag": True},
         float: {"type": number},
