@@ -13,6 +13,7 @@ import trimesh
 from clamp3d import InputError, load
 from clamp3d.files.bodies import unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
+from clamp3d.geometry.shells import volume
 from clamp3d.shapes import load_mesh
 from tests.docs.project import ROOT
 from tests.files.test_gltf import Gltf
@@ -31,6 +32,11 @@ CORNERS = b"0 0 0\n2 2 0\n4 0 0\n2 4 0\n"  # of one face: the second is a notch
 OFF = b"OFF\n4 1 0\n" + CORNERS
 NOTCHED_PLY = PLY[: PLY.index(b"0 0 0")].replace(b"vertex 3", b"vertex 4").replace(b"face 2", b"face 1") + CORNERS
 NOTCHED_OBJ = b"".join(b"v " + line + b"\n" for line in CORNERS.splitlines()) + b"f 1 2 3 4\n"
+WEDGE = (
+    b"v 0 0 0\nv 10 0 0\nv 10 1 0\nv 0 0 5\nv 10 0 5\nv 10 1 5\n"
+    b"f 3 2 1\nf 4 5 6\n  f 1 2 5 4\nf 2 3 6\\\n 5\nf 3 1 4 6\n"
+)
+"""Of triangles and quadrangles, an indented one among them, with 6 degrees from face to face: 25 mm3."""
 
 
 def refused(path, message, **options):
@@ -61,18 +67,24 @@ def with_corner(bits):
         ("a.stl", TEXT[: len(TEXT) // 2], "cut off"),
         ("a.stl", TEXT + TEXT[:80], "cut off"),
         ("a.stl", TEXT.replace(b"endsolid", b""), "cut off"),
+        ("a.stl", TEXT.upper()[: len(TEXT) // 2], "cut off"),
+        ("a.stl", TEXT.replace(b"endfacet", b"", 1), "cut off"),
         ("a.stl", TEXT.replace(b"0.05", b"nan", 1), "not finite"),
         ("a.stl", TEXT.replace(b"0.05", b"zero", 1), "not a readable STL file"),
         ("a.stl", TEXT.replace(b"endloop", b"vertex 0 0 0\nendloop", 1), "cut off"),
         ("a.ply", PLY, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
+        ("a.ply", PLY + b"2 0 1\n", "damaged: it announces 2 faces, 1 were read"),
         ("a.ply", NOTCHED_PLY + b"4 0 1 2 3\n", "a face folds back onto its neighbour"),
         ("a.obj", NOTCHED_OBJ, "a face folds back onto its neighbour"),
         ("a.off", OFF + b"4 0 1 2 3\n", "a face folds back onto its neighbour"),
-        ("a.off", OFF, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
+        ("a.off", OFF + b"# 3 0 1 2\n", "cut off: 5 lines of vertices and faces are announced, 4 follow"),
         ("a.off", OFF + b"5 0 1 2 3 0\n", "a face has more than four corners"),
+        ("a.off", OFF + b"10 0 1 2 3 0 1 2 3 0 1\n", "a face has more than four corners"),
         ("a.off", b"4" + OFF, "4OFF"),
+        ("a.off", b"n" + OFF, "nOFF"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "damaged: a face has 1 corners"),
+        ("a.obj", WEDGE + b"  f 1 2 # 3\n", "damaged: a face has 2 corners"),
         ("a.3mf", b"not a zip", "not a readable 3MF file"),
     ],
 )
@@ -98,16 +110,28 @@ def test_odd_files_that_are_whole_are_read(tmp_path, raw):
     np.testing.assert_array_equal(a.faces, b.faces)
 
 
+def test_a_mesh_without_a_unit_is_taken_as_mm_and_what_is_said_of_it(tmp_path):
+    (tmp_path / "a.obj").write_bytes(WEDGE)
+    for unit, factor in (("m", 1e3), ("cm", 10.0), ("in", 25.4), (None, 1.0)):
+        mesh = load_mesh(tmp_path / "a.obj", unit=unit)
+        assert volume(mesh.vertices, mesh.faces) == pytest.approx(25.0 * factor**3)
+        assert mesh.notes == (() if unit else ("OBJ carries no unit: taken as mm (largest extent 10 mm)",))
+    trimesh.creation.box((0.1, 0.2, 0.5)).export(tmp_path / "a.stl")
+    (note,) = load_mesh(tmp_path / "a.stl").notes
+    assert note.endswith("(largest extent 0.5 mm; if they are metres, unit m makes that 500 mm)")
+
+
 @pytest.mark.parametrize(
     ("objects", "build", "message"),
     [
+        (TIP.replace('"model"', '"odd"'), '<item objectid="1"/>', r"missing: Invalid Model Object Type \(lib3mf\)"),
         (TIP.replace("3", "9"), '<item objectid="1"/>', "not a readable 3MF file"),
         (TIP, '<item objectid="1"/><item objectid="2"/>', "not a readable 3MF file"),
         (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
         (doubled(50), '<item objectid="51"/>', "more than 20000 bodies"),
         (TIP, "", "no body in the file"),
     ],
-    ids=["index", "object", "doubled", "doubled for years", "empty"],
+    ids=["type", "index", "object", "doubled", "doubled for years", "empty"],
 )
 def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
     refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
@@ -135,6 +159,9 @@ def test_units_of_3mf(tmp_path):
     for unit, mm in (("micron", 1e-3), ("centimeter", 10.0), ("meter", 1e3), ("foot", 304.8)):
         (part,) = load(write_3mf(tmp_path / "a.3mf", unit=unit)).parts
         np.testing.assert_allclose(np.ptp(part.shape.mesh.vertices, axis=0), mm, rtol=1e-6)
+    refused(write_3mf(tmp_path / "a.3mf", unit="furlong"), "unit must be one of micron, millimeter")
+    unnamed, printable = TIP.replace(' name="tip"', ""), '<item objectid="1" printable="1"/>'
+    assert [p.name for p in load(write_3mf(tmp_path / "a.3mf", unnamed, printable)).parts] == ["a"]
 
 
 @pytest.mark.filterwarnings("error")
@@ -211,8 +238,13 @@ BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="t
         ('<link name="tip">', "<link>", "not a readable URDF file"),
         ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
         (BASE, "", "each collision of a link must have 1 shape, got 0"),
+        (BASE, BASE + BASE, "each collision of a link must have 1 shape, got 2"),
+        ('<mesh filename="rail.stl" scale="0.001 0.001 0.001"/>', "", "each visual of a link must have 1 shape, got 0"),
+        ("</collision></link>", '</collision><link name="in"/></link>', "a link holds another link"),
         (BASE, '<mesh filename="no.stl"/>', r"missing: base \(.*no such file"),
-        (BASE, '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
+        (BASE, '<mesh filename="../../away.stl"/>', "no such file in the robot's folder"),
+        (BASE, '<mesh filename="arm.urdf"/>', r"base \(arm.urdf: a mesh must be one of .stl"),
+        (BASE, '<mesh filename="arm.step"/>', r"base \(arm.step: a mesh must be one of .stl"),
         ('radius="0.01"', 'radius="big"', "not a readable URDF file"),
         ('radius="0.01"', 'radius="-1"', r"missing: rail \(.*; tip \(radius of a sphere must be"),
         ('"turn" type="revolute"', '"turn" type="revolut"', "joint turn must be one of revolute, .*got 'revolut'"),
@@ -223,8 +255,10 @@ BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="t
 def test_a_robot_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     pytest.importorskip("yourdfpy")
     assert text in ROBOT
-    folder = tmp_path / "arm"
-    folder.mkdir()
+    folder = tmp_path / "arm" / "urdf"
+    folder.mkdir(parents=True)
+    for name in (folder / "arm.step", tmp_path / "away.stl"):
+        name.write_bytes(PIN)
     count = -1 if text == "robot" else 1
     (folder / "arm.urdf").write_text(ROBOT.replace(text, instead, count))
     refused(folder / "arm.urdf", message)
