@@ -2,6 +2,7 @@
 
 import base64
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
 
 CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "f4")
 INSTANCES = "EXT_mesh_gpu_instancing"
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -31,7 +33,7 @@ class Gltf:
 
     def numbers(self, array, **more):
         array = np.asarray(array)
-        kinds = {"f4": 5126, "u4": 5125, "u2": 5123, "i2": 5122}
+        kinds = {"f4": 5126, "u4": 5125, "u2": 5123, "i2": 5122, "u1": 5121, "i1": 5120}
         kind = "VEC3" if array.ndim == 2 else "SCALAR"
         component = kinds[array.dtype.str[1:]]
         made = {"bufferView": self.view(array), "componentType": component, "count": len(array), "type": kind}
@@ -57,10 +59,20 @@ class Gltf:
         path.write_text(json.dumps(self.data))
         return path
 
+    def write_glb(self, path, version=2, lost=0):
+        """The binary form, less the last bytes that are ``lost``."""
+        binary = self.binary + b"\0" * (-len(self.binary) % 4)
+        text = json.dumps(self.data | {"buffers": [{"byteLength": len(binary)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = [struct.pack("<I4s", len(raw), kind) + raw for raw, kind in ((text, b"JSON"), (binary, b"BIN\0"))]
+        size = 12 + sum(map(len, chunks))
+        path.write_bytes(b"".join([struct.pack("<4sII", b"glTF", version, size), *chunks])[: size - lost])
+        return path
+
 
 def only(tmp_path, *primitives_of):
     made = Gltf()
-    made.node(mesh=made.mesh(*(make(made) for make in primitives_of)))
+    made.node(children=[made.node(mesh=made.mesh(*(make(made) for make in primitives_of)))])
     (body,) = load_bodies(made.write(tmp_path / "a.gltf")).bodies
     return trimesh.Trimesh(body.shape.mesh.vertices / 1000.0, body.shape.mesh.faces)
 
@@ -69,7 +81,7 @@ def test_nodes_are_parts_with_names_places_and_shared_shapes(tmp_path):
     made = Gltf()
     cube = made.mesh(made.cube())
     turn = [0.0, 0.0, np.sin(0.3), np.cos(0.3)]
-    small = made.node(name="small", mesh=cube, scale=[0.5, 0.5, 0.5], translation=[0.0, 1.0, 0.0])
+    small = made.node(name="small", mesh=cube, scale=[0.5, 0.25, 2.0], translation=[0.0, 1.0, 0.0])
     mirrored = made.node(name="mirrored", mesh=cube, scale=[-1.0, 1.0, 1.0])
     top = made.node(name="arm", children=[small, mirrored], rotation=turn, translation=[1.0, 2.0, 3.0])
     again = made.node(name="arm", mesh=cube, translation=[4.0, 0.0, 0.0])
@@ -78,6 +90,7 @@ def test_nodes_are_parts_with_names_places_and_shared_shapes(tmp_path):
     scene = load(made.write(tmp_path / "robot.gltf"))
     assert [part.name for part in scene.parts] == ["small", "mirrored", "arm_1", "arm_2"]
     assert scene.parts[2].shape is scene.parts[3].shape
+    assert scene.notes == ()  # no winding is repaired
     truth = trimesh.load_scene(tmp_path / "robot.gltf")
     worlds = []
     for node in truth.graph.nodes_geometry:
@@ -114,13 +127,40 @@ def test_strips(tmp_path):
     assert mesh.volume == pytest.approx(0.5 * 5 * np.sin(2 * np.pi / 5), rel=1e-6)
 
 
-def test_quantised_numbers(tmp_path):
-    def quantised(g):
-        V = np.round(np.asarray(CUBE.vertices) / 3.0 * 32767).astype("i2")
-        faces = g.numbers(np.asarray(CUBE.faces, "u2").ravel())
-        return {"attributes": {"POSITION": g.numbers(V, normalized=True)}, "indices": faces}
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2"])
+def test_quantised_numbers(tmp_path, kind):
+    most = np.iinfo(kind).max
 
-    assert only(tmp_path, quantised).volume == pytest.approx(6.0 / 27.0, rel=1e-3)
+    def quantised(g):
+        position = g.numbers(np.where(np.asarray(CUBE.vertices) > 0, most, 0).astype(kind), normalized=True)
+        return {"attributes": {"POSITION": position}, "indices": g.numbers(np.asarray(CUBE.faces, "u2").ravel())}
+
+    assert only(tmp_path, quantised).volume == pytest.approx(1.0, rel=1e-6)
+
+
+def test_of_several_scenes_one_is_read_and_what_is_no_body_in_it_is_noted(tmp_path):
+    made = Gltf()
+    other = made.node(name="other", mesh=made.mesh({"attributes": {"POSITION": made.numbers(CORNERS)}, "mode": 3}))
+    cube = made.node(mesh=made.mesh(made.cube()), translation=[7.0, 0.0, 0.0])
+    top = made.node(camera=0, children=[cube])
+    made.data |= {"scenes": [{"nodes": []}, {"nodes": [top, other]}], "scene": 1, "skins": [{"joints": [0]}]}
+    made.data |= {"extensionsRequired": ["KHR_mesh_quantization"], "cameras": [{"type": "perspective"}]}
+    for path in (made.write(tmp_path / "a.gltf"), made.write_glb(tmp_path / "a.glb")):
+        scene = load(path, unit="mm")
+        assert scene.notes == ("skins and morph targets are left at rest", "other: points or lines, left out")
+        (part,) = scene.parts
+        assert (part.name, part.T_world[:3, 3].tolist()) == ("cube", [7.0, 0.0, 0.0])
+        assert np.ptp(part.shape.mesh.vertices, axis=0).tolist() == [1.0, 3.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("version", "lost", "message"), [(1, 0, r"not a readable GLB file \(version 1\)"), (2, 1, "the file is cut off: ")]
+)
+def test_a_glb_of_another_version_or_cut_off_is_refused(tmp_path, version, lost, message):
+    made = Gltf()
+    made.node(mesh=made.mesh(made.cube()))
+    with pytest.raises(InputError, match=message):
+        load(made.write_glb(tmp_path / "a.glb", version, lost))
 
 
 def bad_cube(g, accessor=None, **primitive):
@@ -134,18 +174,31 @@ def bad_cube(g, accessor=None, **primitive):
     ("spoil", "message"),
     [
         (lambda g: g.node(name="bad", mesh=7), "node 1, or its mesh, is not in the file"),
-        (lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 99]]))), r"missing: bad \(face index 99 is out of"),
+        (lambda g: g.node(name="bad", mesh=-1), "node 1, or its mesh, is not in the file"),
+        (lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 8]]))), r"missing: bad \(face index 8 is out of"),
         (lambda g: g.data.update(scenes=[{"nodes": [0, 9]}]), "node 9, or its mesh, is not in the file"),
+        (lambda g: g.data.update(scenes=[{"nodes": [-1]}]), "node -1, or its mesh, is not in the file"),
+        (lambda g: g.node(mesh=0, children=[g.node(children=[2])]), "node 1 is below itself"),
         (lambda g: g.data.update(extensionsRequired=["EXT_meshopt"]), "needs EXT_meshopt, which is not read"),
         (
             lambda g: g.node(name="bad", mesh=0, extensions={INSTANCES: {}}),
             rf"missing: bad .its instances .{INSTANCES}",
         ),
-        (lambda g: g.data.update(scenes=[{"nodes": [0, 0]}]), "in the tree twice"),
+        (lambda g: g.data.update(scenes=[{"nodes": [g.node(children=[0, 0])]}]), "in the tree twice"),
+        (lambda g: g.data.update(scenes=[{"nodes": [g.node(children=[1])]}]), "in the tree twice"),
+        (
+            lambda g: g.node(name="bad", mesh=0, scale=[1, 1, 0]),
+            r"missing: bad \(its placement is flat or not finite\)",
+        ),
+        (
+            lambda g: g.node(name="bad", mesh=0, translation=[np.nan, 0, 0]),
+            r"missing: bad \(its placement is flat or not",
+        ),
         (lambda g: g.node(rotation=[0.0, 0.0, 0.0, 2.0]), "rotation of a node must be a quaternion of length 1, got"),
         (lambda g: bad_cube(g, lambda accessor: accessor.update(count=10**9)), "not a readable GLTF file"),
         (lambda g: bad_cube(g, lambda accessor: accessor.pop("bufferView")), "sparse or empty numbers are not read"),
         (lambda g: bad_cube(g, lambda accessor: accessor.update(sparse={})), "sparse or empty numbers are not read"),
+        (lambda g: bad_cube(g) or g.data["accessors"][-1].update(sparse={}), "sparse or empty numbers are not read"),
         (lambda g: bad_cube(g, mode=6), "triangles of mode 6 are not read"),
     ],
 )
