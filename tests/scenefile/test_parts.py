@@ -143,11 +143,7 @@ def test_a_continuous_joint_turns_by_any_angle(robot):
 
 @pytest.mark.parametrize(
     ("robots", "name"),
-    [
-        ("arm", "../meshes/a.glb"),
-        ("arm", "package://arm_description/meshes/a.glb"),
-        ("b", "package://arm/meshes/a.glb"),
-    ],
+    [("arm", "../meshes/a.glb"), ("arm", "package://arms/meshes/a.glb"), ("b", "package://arm/meshes/a.glb")],
 )
 def test_meshes_of_a_robot_are_found_where_ros_has_them_and_keep_their_axes(robot, tmp_path, robots, name):
     (tmp_path / "arm" / "meshes").mkdir(parents=True)
