@@ -18,7 +18,7 @@ from clamp3d.engine.refine import refine
 from clamp3d.engine.surface import Surface
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.files import cad_process, pairs
-from clamp3d.files.open_cascade import occ, to_bytes
+from clamp3d.files.open_cascade import from_bytes, occ, to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
@@ -123,10 +123,13 @@ def test_where_open_cascade_misses_a_common_part_or_some_of_it_nothing_is_known(
     assert exact_overlap(ball, cone, np.eye(4), 0.04, attested=0.004).lower <= -0.005
 
 
+@pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("family", ["balls", "ball_on_plate", "rods_crossed"])
-def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family):
-    a, b = models(family, -0.06)
-    part = cad_process.common(a.exact.brep, b.exact.brep, np.eye(4), 0.5)
+def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family, order):
+    a, b = models(family, -0.06)[::order]
+    T = random_pose(np.random.default_rng(1))
+    turned = to_bytes(moved(from_bytes(b.exact.brep), np.linalg.inv(T)))
+    part = cad_process.common(a.exact.brep, turned, T, 0.5)
     for model, border in zip((a, b), part.borders, strict=True):
         middles = border.points[border.triangles].mean(axis=1)[::9]
         assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= part.chord

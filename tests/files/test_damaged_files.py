@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from clamp3d import InputError, load
-from clamp3d.files.bodies import unique_names
+from clamp3d.files.bodies import Reading, unique_names
 from clamp3d.files.worker import LIMITS, OUTSIDE, process
 from clamp3d.geometry.shells import volume
 from clamp3d.shapes import load_mesh
@@ -164,6 +164,11 @@ def test_a_turn_of_six_digits_is_a_turn(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
     trimesh.creation.icosphere(5).export(tmp_path / "a.obj")
+    size, limits = (tmp_path / "a.obj").stat().st_size, {}
+    with monkeypatch.context() as patch:
+        patch.setattr(type(process()), "call", lambda *_, **most: limits.update(most) or Reading())
+        refused(tmp_path / "a.obj", "no body in the file")
+    assert limits == {"time_limit": pytest.approx(60 + 20e-6 * size), "memory": pytest.approx(2**31 + 60 * size)}
     monkeypatch.setenv(LIMITS, "1e-6")
     refused(tmp_path / "a.obj", "(takes more than 0.0 GB to read|not read in 0 s); CLAMP3D_READ_LIMITS=4 allows four")
     monkeypatch.setenv(LIMITS, "lots")

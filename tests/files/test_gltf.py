@@ -163,7 +163,7 @@ def bad_cube(g, accessor=None, **primitive):
     [
         (lambda g: g.node(name="bad", mesh=7), "node 1, or its mesh, is not in the file"),
         (lambda g: g.node(name="bad", mesh=-1), "node 1, or its mesh, is not in the file"),
-        (lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 8]]))), r"missing: bad \(face index 8 is out of"),
+        (lambda g: g.node(name="bad", mesh=g.mesh(g.cube(F=[[0, 1, 8]]), g.cube())), r"bad \(face index 8 is out of"),
         (lambda g: g.data.update(scenes=[{"nodes": [0, 9]}]), "node 9, or its mesh, is not in the file"),
         (lambda g: g.data.update(scenes=[{"nodes": [-1]}]), "node -1, or its mesh, is not in the file"),
         (lambda g: g.node(mesh=0, children=[g.node(children=[2])]), "node 1 is below itself"),
@@ -192,5 +192,5 @@ def test_what_is_not_whole_is_refused(tmp_path, spoil, message):
     with pytest.raises(InputError, match=message) as caught:
         load(path)
     assert "\n" not in str(caught.value)
-    if "missing" in message:
+    if "missing" in str(caught.value):
         assert len(load(path, partial=True).parts) == 1
