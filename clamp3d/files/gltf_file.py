@@ -113,7 +113,8 @@ def _beside(path: Path, name: str) -> bytes:
 def _nodes(tree: dict[str, Any]) -> list[int]:
     """Numbers of the scene's nodes that have a mesh. Raises InputError for one that is not there, or there twice."""
     nodes = tree.get("nodes", [])
-    if not tree.get("scenes"):
+    takes_all = not tree.get("scenes")
+    if takes_all:
         below = {child for node in nodes for child in node.get("children", [])}
         tree["scenes"], tree["scene"] = [{"nodes": [k for k in range(len(nodes)) if k not in below]}], 0
     stack = list(reversed(tree["scenes"][tree.get("scene", 0)].get("nodes", [])))
@@ -129,6 +130,8 @@ def _nodes(tree: dict[str, Any]) -> list[int]:
         if not abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE:
             raise InputError(f"the rotation of a node must be a quaternion of length 1, got {shown(turn)}")
         stack += reversed(nodes[k].get("children", []))
+    if takes_all and len(visited) < len(nodes):
+        raise InputError(f"node {next(k for k in range(len(nodes)) if k not in visited)} is below itself")
     return [k for k in visited if "mesh" in nodes[k]]
 
 

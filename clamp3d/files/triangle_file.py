@@ -40,6 +40,8 @@ def read_triangles(path: Path, unit: str | None) -> Reading:
 def _arrays(path: Path) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3), in the file's unit."""
     raw, kind = path.read_bytes(), path.suffix[1:].lower()
+    if kind == "obj":  # trimesh passes over lines that begin with blanks
+        raw = re.sub(rb"(?m)^[ \t]+", b"", re.sub(rb"\\\r?\n", b" ", raw))
     announced = _ANNOUNCED[kind](raw)
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`
@@ -97,7 +99,7 @@ def _announced_stl(raw: bytes) -> int:
 
 
 def _announced_obj(raw: bytes) -> int:
-    corners = [len(line.split()) - 1 for line in re.findall(rb"(?m)^[ \t]*f[ \t][^\r\n#]*", raw)]
+    corners = [len(line.split()) - 1 for line in re.findall(rb"(?m)^f[ \t][^\r\n#]*", raw)]
     if min(corners, default=3) < 3:  # trimesh leaves it out
         raise InputError(f"the file is damaged: a face has {min(corners)} corners")
     return len(corners)

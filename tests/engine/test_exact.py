@@ -20,7 +20,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.engine.where import Locator
 from clamp3d.files import cad_process, pairs
-from clamp3d.files.open_cascade import occ, to_bytes
+from clamp3d.files.open_cascade import from_bytes, occ, to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
@@ -141,10 +141,17 @@ def test_where_open_cascade_misses_a_common_part_or_some_of_it_nothing_is_known(
     assert exact_overlap(ball, cone, np.eye(4), 0.04, attested=0.004).lower <= -0.005
 
 
+@pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("family", ["balls", "ball_on_plate", "rods_crossed"])
-def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family):
-    a, b = models(family, -0.06)
-    points, at_most = _depth_bounds(cad_process.common(a.exact.brep, b.exact.brep, np.eye(4), 0.5))
+def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family, order):
+    a, b = models(family, -0.06)[::order]
+    T = random_pose(np.random.default_rng(1))
+    turned = to_bytes(moved(from_bytes(b.exact.brep), np.linalg.inv(T)))
+    part = cad_process.common(a.exact.brep, turned, T, 0.5)
+    for model, border in zip((a, b), part.borders, strict=True):
+        middles = border.points[border.triangles].mean(axis=1)[::9]
+        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= part.chord
+    points, at_most = _depth_bounds(part)
     rows = np.linspace(0, len(points) - 1, 60).astype(int)
     depths = [np.abs(cad_process.depths(model.exact.brep, points[rows])) for model in (a, b)]
     assert (at_most[rows] >= np.maximum(*depths) - 1e-9).all()
@@ -205,7 +212,8 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
         if nearest.is_least:
             assert nearest.distance == pytest.approx(gap, abs=1e-6)
         assert np.linalg.norm(nearest.q - nearest.p) == pytest.approx(nearest.distance, abs=1e-9)
-    assert not (known and missed)
+        assert np.linalg.norm(nearest.p) == pytest.approx(radii[0], abs=1e-6)
+    assert missed <= (0 if known else 12)
 
 
 @pytest.mark.parametrize("splines", [0.0, 1.0])
@@ -277,6 +285,7 @@ def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monke
             pass
 
     angle = BrepSolid.of(cut(block((-5, -5, -5), (5, 5, 5)), block((0, 0, -6), (6, 6, 6))), "angle").brep
+    at_edge = to_bytes(moved(ball(1.0), shift(-1.0, -1.0)))
     at_edges, in_faces = np.array([[-1.0, -1.0, 0.0], [8.0, -9.0, 0.0]]), np.array([[2.0, -1.0, 0.0], [2.0, 1.0, 0.0]])
     for is_wrong in (True, False):
         with monkeypatch.context() as patch:
@@ -284,9 +293,17 @@ def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monke
                 patch.setattr(occ, "BRepClass3d_SolidClassifier", Wrong, raising=False)
             assert pairs.depths(angle, at_edges) == pytest.approx([-(2.0**0.5) if is_wrong else 2.0**0.5, -5.0])
             assert pairs.depths(angle, in_faces) == pytest.approx([1.0, -1.0])
+            assert not pairs.distance(at_edge, angle, np.eye(4)).is_signed
 
 
-@pytest.mark.parametrize("shape", [ball(5.0), ring(8.0, 2.0), cone(5.0, 0.0, 0.0, 7.0), cone(2.0, 5.0, 0.0, 7.0)])
+def test_depths_beside_a_narrow_slot_and_of_a_point_as_near_to_an_edge_as_to_a_face():
+    slotted = to_bytes(first_solid(cut(block((-5, -5, -5), (5, 5, 5)), block((0, 0, -6), (0.2, 6, 6)))))
+    notched = to_bytes(first_solid(cut(block((-9, -9, -9), (9, 1, 9)), block((0.6, -10, -10), (10, -0.8, 10)))))
+    assert pairs.depths(slotted, np.array([[-1.0, -1.0, 0.0]])) == pytest.approx([2.0**0.5])
+    assert pairs.depths(notched, np.zeros((1, 3))) == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize("shape", [cut(ball(8.0), ball(5.0)), ring(8.0, 2.0), *(cone(r, 5 - r, 0, 7) for r in (5, 2))])
 @pytest.mark.parametrize("turned", [False, True])
 def test_depths_of_points_are_those_from_a_fine_mesh(shape, turned):
     """Inside by its winding numbers; Open CASCADE tells it by the normal at the nearest point."""

@@ -21,23 +21,37 @@ def centre(part):
 def test_a_trimesh_scene():
     source = trimesh.Scene()
     box = trimesh.creation.box((1.0, 2.0, 3.0))
+    assert (load(box).parts[0].name, volumes(load(box))) == ("part", pytest.approx([6.0]))
     move = trimesh.transformations.translation_matrix([5.0, 0.0, 0.0])
     source.add_geometry(box, node_name="lid", geom_name="box", transform=move)
-    source.add_geometry(box, node_name="base", geom_name="box")
+    source.graph.update("base", geometry="box")
     source.units = "inches"
     scene = load(source)
+    assert scene.parts[0].shape is scene.parts[1].shape
     assert {p.name: centre(p).round(6).tolist() for p in scene.parts} == {"lid": [127.0, 0, 0], "base": [0, 0, 0]}
     assert volumes(scene) == pytest.approx([6.0 * 25.4**3] * 2, rel=1e-6)
     assert check(scene).counts == {"clear": 1}
-    assert load(box).parts[0].name == "part"
+    dot = trimesh.PointCloud([[0.0, 0.0, 0.0]])
+    source.add_geometry(dot, node_name="dot")
+    assert "dot: PointCloud, left out" in load(source).notes
+    for units, mm in (("millimeters", 1.0), ("centimeters", 10.0), ("meters", 1e3)):
+        box.units = units
+        assert volumes(load(box)) == pytest.approx([6.0 * mm**3])
+    box.units = "furlongs"
+    with pytest.raises(InputError, match=r"units must be one of millimeters, .*, None, got 'furlongs'"):
+        load(box)
+    with pytest.raises(InputError, match=r"source must be a trimesh.Scene or a trimesh.Trimesh, got PointCloud"):
+        load(dot)
 
 
 def test_what_is_no_body_is_refused():
-    for thing in (3, object(), [1, 2], None):
+    for thing in (3, object(), [1, 2], None, SimpleNamespace(wrapped=None)):
         with pytest.raises(InputError, match="source must be a path, a clamp's name, or an object of CadQuery"):
             load(thing)
     with pytest.raises(InputError, match="source must be a path"):
         load(pytest.importorskip("build123d").Compound())
+    with pytest.raises(InputError, match="source must be a path"):
+        load(pytest.importorskip("OCP").TopoDS.TopoDS_Solid())
     with pytest.raises(InputError, match="joints goes with a robot description"):
         load(trimesh.creation.box(), joints={"a": 1.0})
 

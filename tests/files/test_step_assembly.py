@@ -12,6 +12,7 @@ pytest.importorskip("OCP")
 from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
 from clamp3d.files.open_cascade import explore, occ
+from clamp3d.files.part21 import announced
 from clamp3d.geometry.shells import volume
 from tests.cad import Tree, location, random_pose
 from tests.files.step_scenes import nested, pin, plate
@@ -31,6 +32,8 @@ def test_names_places_and_volumes_of_a_tree(written):
     for part, (_, size, T) in zip(scene.parts, truth, strict=True):
         np.testing.assert_allclose(part.T_world, T, atol=1e-6)
         mesh = part.shape.mesh
+        V = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+        np.testing.assert_allclose(part.shape.bounds_at(T), [V.min(axis=0), V.max(axis=0)], atol=0.03)
         assert mesh.watertight
         area = part.shape.error * np.abs(mesh.vertices).max() ** 2 * 20
         assert abs(volume(mesh.vertices, mesh.faces) - size) < area
@@ -47,6 +50,7 @@ def test_several_solids_of_one_product_are_several_parts(tmp_path):
     tree.product("welded", both)
     scene = load(tree.write(tmp_path / "welded.step"))
     assert [part.name for part in scene.parts] == ["welded_1", "welded_2"]
+    np.testing.assert_allclose(load(both).parts[1].T_world, T, atol=1e-9)
 
 
 def test_what_has_no_name_is_called_after_what_holds_it_and_names_need_not_be_utf8(tmp_path):
@@ -100,12 +104,12 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
 @pytest.mark.parametrize(
     ("text", "instead", "message"),
     [
-        ("\nDATA;", "\nDATA; /* it's no text; #1 = ( */", None),
+        ("\nDATA;", "\nDATA; /* it's no text;\n #69 = ( */", None),
         ("DIRECTION('',", "DIRECTION('it''s (, #999999',", None),
+        ("MANIFOLD_SOLID_BREP('',#69", "MANIFOLD_SOLID_BREP('',#0069", None),
+        ("\n#69 =", "\n#069 =", None),
         ("DIRECTION('',", "DIRECTION('', ,", "damaged: .*Incorrect syntax"),
-        ("DIRECTION('',", "DIRECTION(('',", "damaged: .*Incorrect syntax"),
         ("DIRECTION('',", "DIRECTION(#999999,", "damaged: Unresolved Reference"),
-        ("DIRECTION('',", "DIRECTION 7 = ('',", "damaged: .*Incorrect syntax"),
         ("CARTESIAN_POINT('',(0.,", "CARTESIAN_POINT('',('0',", "damaged: .*not a Real"),
         ("AXIS2_PLACEMENT_3D(", "AXIS2_PLACEMENT3D(", "damaged: .*transform_item"),
         ("_TRANSFORMATION('','',#11,", "_TRANSFORMATION('','',$,", "damaged: .*transform_item_1"),
@@ -126,6 +130,19 @@ def test_a_text_that_is_not_whole_is_refused(tmp_path, text, instead, message):
     else:
         with pytest.raises(InputError, match=message):
             load(path)
+
+
+KINDS = (
+    "ADVANCED_FACE|CLOSED_SHELL|EDGE_LOOP|FACE_BOUND|ORIENTED_EDGE|MANIFOLD_SOLID_BREP|PRODUCT_DEFINITION|"
+    "ITEM_DEFINED_TRANSFORMATION|ADVANCED_BREP_SHAPE_REPRESENTATION"
+)
+
+
+def test_what_nothing_refers_to_any_more_is_missing(tmp_path):
+    path = nested(np.random.default_rng(7))[0].write(tmp_path / "machine.step")
+    for number, kind in re.findall(rf"\n#(\d+) = ({KINDS})\(", before := path.read_text()):
+        path.write_text(re.sub(rf"(?<!\n)#{number}\b", "$", before))
+        assert announced(path).lost == (f"{kind} (#{number}) that belongs to nothing",)
 
 
 @pytest.mark.parametrize(

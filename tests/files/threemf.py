@@ -9,7 +9,7 @@ TYPES = (
 )
 RELATIONS = (
     '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship '
-    'Target="/3D/3dmodel.model" Id="a" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
+    'Target="/3D/part.model" Id="a" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
     "</Relationships>"
 )
 CORNERS = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
@@ -18,13 +18,13 @@ SOLID = f"<mesh><vertices>{CORNERS}</vertices><triangles>{SIDES}</triangles></me
 TIP = f'<object id="1" type="model" name="tip">{SOLID}</object>'
 
 
-def write_3mf(path, objects=TIP, build='<item objectid="1"/>', unit="millimeter", method=zipfile.ZIP_DEFLATED):
+def write_3mf(path, objects=TIP, build='<item objectid="1"/>', unit="millimeter"):
     model = (
         f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
         f"<resources>{objects}</resources><build>{build}</build></model>"
     )
-    with zipfile.ZipFile(path, "w", method) as archive:
-        for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS), ("3D/3dmodel.model", model)):
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS), ("3D/part.model", model)):
             archive.writestr(name, '<?xml version="1.0" encoding="UTF-8"?>' + text)
     return path
 

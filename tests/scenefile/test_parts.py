@@ -77,8 +77,9 @@ def test_two_files_of_one_name_are_refused_by_name(folder):
 
 
 ROBOT = """<robot name="arm">
-  <link name="base"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
-  <link name="rail"><visual><origin xyz="0 0 0.05"/>
+  <link name="base"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision>
+    <visual><geometry><box size="9 9 9"/></geometry></visual></link>
+  <link name="rail"><visual><origin xyz="0.01 0 0.05"/>
     <geometry><mesh filename="rail.stl" scale="0.001 0.001 0.001"/></geometry></visual></link>
   <link name="tip"><collision><geometry><sphere radius="0.01"/></geometry></collision>
     <collision><origin xyz="0 0 0.012"/><geometry><cylinder radius="0.004" length="0.02"/></geometry></collision></link>
@@ -104,7 +105,9 @@ def test_a_robot_with_joint_values(robot):
     base, rail, ball, pin = scene.parts
     assert base.T_world.tolist() == np.eye(4).tolist()
     assert base.shape.bounds.tolist() == [[-50.0, -50.0, -10.0], [50.0, 50.0, 10.0]]
-    np.testing.assert_allclose(rail.T_world[:3, 3], [0, 0, 60], atol=1e-9)
+    assert pin.shape.bounds.tolist() == [[-4.0, -4.0, -10.0], [4.0, 4.0, 10.0]]
+    assert scene.notes == ("links without collision shapes are taken by their visual ones",)
+    np.testing.assert_allclose(rail.T_world[:3, 3], [10 * np.cos(np.pi / 6), 5, 60], atol=1e-9)
     np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", 30, degrees=True).as_matrix(), atol=1e-9)
     assert np.ptp(rail.shape.mesh.vertices, axis=0).round(3).tolist() == [10.0, 20.0, 60.0]
     at = [30 * np.cos(np.pi / 6), 30 * np.sin(np.pi / 6), 210]
@@ -123,6 +126,7 @@ def test_a_robot_with_joint_values(robot):
     [
         ({"elbow": 1.0}, "joint must be one of turn, slide, got 'elbow'"),
         ({"turn": 2.5}, "joint turn must be from -1 to 2 rad, got 2.5"),
+        ({"turn": -1.5}, "joint turn must be from -1 to 2 rad, got -1.5"),
         ({"slide": 60.0}, "joint slide must be from 10 to 50 mm, got 60"),
     ],
 )
@@ -131,11 +135,24 @@ def test_joint_values_that_do_not_go(robot, joints, message):
         load(robot, joints=joints)
 
 
-def test_a_joint_without_limits_turns_by_any_angle(robot):
-    limit = '<limit lower="-1" upper="2" effort="1" velocity="1"/>'
-    robot.write_text(ROBOT.replace("revolute", "continuous").replace(limit, ""))
-    rail = load(robot, joints={"turn": 5.0}).parts[1]
-    np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", 5.0).as_matrix(), atol=1e-9)
+def test_a_continuous_joint_turns_by_any_angle(robot):
+    robot.write_text(ROBOT.replace("revolute", "continuous"))
+    rail = load(robot, joints={"turn": -5.0}).parts[1]
+    np.testing.assert_allclose(rail.T_world[:3, :3], Rotation.from_euler("z", -5.0).as_matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("robots", "name"),
+    [("arm", "../meshes/a.glb"), ("arm", "package://arms/meshes/a.glb"), ("b", "package://arm/meshes/a.glb")],
+)
+def test_meshes_of_a_robot_are_found_where_ros_has_them_and_keep_their_axes(robot, tmp_path, robots, name):
+    (tmp_path / "arm" / "meshes").mkdir(parents=True)
+    trimesh.creation.box(bounds=[(0, 0, 0), (0.01, 0.02, 0.06)]).export(tmp_path / "arm" / "meshes" / "a.glb")
+    path = tmp_path / robots / "urdf" / "arm.urdf"
+    path.parent.mkdir(parents=True)
+    path.write_text(ROBOT.replace("rail.stl", name).replace("0.001 0.001 0.001", "1 1 1"))
+    V = load(path).parts[1].shape.mesh.vertices
+    np.testing.assert_allclose([V.min(axis=0), V.max(axis=0)], [[0, 0, 0], [10, 20, 60]], atol=1e-6)
 
 
 def test_a_robot_without_one_of_its_meshes_is_refused(robot):
