@@ -57,6 +57,8 @@ def test_a_mesh_is_one_part(suffix, tmp_path):
         ("scene.toml", {"line": "LJ-500"}, "line goes with a clamp, not with scene.toml"),
         ("cube.stl", {"jumper": "16"}, "jumper goes with a clamp, not with cube.stl"),
         ("reference", {"unit": "mm"}, "unit goes with a mesh file, not with reference"),
+        ("no.step", {"unit": "mm"}, "unit: STEP files state their unit themselves"),
+        ("no.3mf", {"unit": "mm"}, "unit: 3MF files state their unit themselves"),
         ("", {}, "source must not be empty"),
         (3, {}, "source must be a path, a clamp's name, or an object of CadQuery, build123d, Open CASCADE or"),
     ],

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clamp3d import InputError, Verdict, check, load_scene
+from clamp3d import InputError, Verdict, check, load_scene, shapes
+from clamp3d.kernel import SweptArc
 from clamp3d.scenefile.file import parse_scene
 from clamp3d.scenefile.pose_table import Pose
 
@@ -66,6 +67,9 @@ def test_every_kind_of_part(tmp_path):
     file = tmp_path / "all.toml"
     file.write_text(EVERY_KIND, encoding="utf-8")
     scene = load_scene(file)
+    groove, others = SweptArc(7.0, math.radians(60), 50.0), [(18.0, 5.0, math.radians(50))]
+    block = shapes.groove_block(groove, 60.0, 20.0, others=others, holes=[shapes.Hole(2.0, (-15.0, 3.0), "y")])
+    assert {part.name: part.shape for part in scene.parts}["block"] == block
     result = check(scene)
     assert result.verdict("block", "wire") is Verdict.CLEARANCE
     assert result.verdict("line", "tube") is Verdict.CLEARANCE  # 16.45 - 16.335

@@ -166,9 +166,10 @@ def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
     trimesh.creation.icosphere(5).export(tmp_path / "a.obj")
     size, limits = (tmp_path / "a.obj").stat().st_size, {}
     with monkeypatch.context() as patch:
+        patch.setenv(LIMITS, "2")
         patch.setattr(type(process()), "call", lambda *_, **most: limits.update(most) or Reading())
         refused(tmp_path / "a.obj", "no body in the file")
-    assert limits == {"time_limit": pytest.approx(60 + 20e-6 * size), "memory": pytest.approx(2**31 + 60 * size)}
+    assert limits == {"time_limit": pytest.approx(120 + 40e-6 * size), "memory": pytest.approx(2**32 + 120 * size)}
     monkeypatch.setenv(LIMITS, "1e-6")
     refused(tmp_path / "a.obj", "(takes more than 0.0 GB to read|not read in 0 s); CLAMP3D_READ_LIMITS=4 allows four")
     monkeypatch.setenv(LIMITS, "lots")
