@@ -48,6 +48,8 @@ _TIGHT = 1.01
 """Ratio of a way out to the depth of a point at which finer meshes are not tried."""
 _ADVANCES = 6
 """How often a way out is shortened by the gap that it leaves: at 45 degrees to the faces each time by two thirds."""
+_SHORTER = 0.01
+"""Share by which a way out must have got shorter to be shortened once more."""
 _SHORTENED = 1e-3
 """Ratio of the width of a gap's bounds to a way out at which the gap that it leaves is measured no further."""
 _CLOSE = 1.05
@@ -163,7 +165,10 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Di
         # If it is shorter than a point is deep, some of the gap was overlooked.
         if shorter.lower <= way.lower or upper < shorter.lower - 2.0 * TOLERANCE:
             break
+        is_sharp = shorter.lower - way.lower <= _SHORTER * -way.lower
         way = replace(shorter, upper=max(upper, shorter.lower))
+        if is_sharp:
+            break
     return way
 
 
