@@ -15,6 +15,7 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
+from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance, exact_overlap
 from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
@@ -165,9 +166,9 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Di
         # If it is shorter than a point is deep, some of the gap was overlooked.
         if shorter.lower <= way.lower or upper < shorter.lower - 2.0 * TOLERANCE:
             break
-        is_sharp = shorter.lower - way.lower <= _SHORTER * -way.lower
+        gains_little = shorter.lower - way.lower <= _SHORTER * -way.lower
         way = replace(shorter, upper=max(upper, shorter.lower))
-        if is_sharp:
+        if gains_little:
             break
     return way
 
@@ -175,7 +176,7 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Di
 def _reached(a: Model, b: Model, meshes: _OverlappingMeshes) -> float:
     """A depth (mm) that some point has: meshes around drawn bodies attest none, those inside them do."""
     if not (a.bracketed or b.bracketed):
-        return deepest(*meshes[:4])[0]
+        return deepest(meshes.a, meshes.b, meshes.T, meshes.shared)[0]
     inner_a, inner_b = a.inner(a.chords[-1]), b.inner(b.chords[-1])
     if inner_a is None or inner_b is None:
         return 0.0
@@ -189,8 +190,6 @@ def _shortened(a: Model, b: Model, T: Array, way: Array) -> Distance:
     ``way`` (3,) parts them too. Lemma: bodies that keep a gap after a translation are also apart after one that is
     shorter by as much, since no point moves by more. The points that are nearest after it are about as deep before.
     """
-    from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance
-
     moved = T.copy()
     moved[:3, 3] += way
     length = float(np.linalg.norm(way))
@@ -215,13 +214,12 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes) -> Distance:
     """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the finest meshes."""
     own = Distance()
     if a.exact is not None and b.exact is not None:
-        from clamp3d.engine.exact import exact_overlap
-
         own = exact_overlap(a, b, meshes.T, SHARES[1])
         if np.isfinite(own.lower):
             return own
         *_, meshes = _overlapping_meshes(a, b, meshes.T)
-    return replace(own, lower=-meshes.hidden - thickness(*meshes[:4], _is_sharp, FEW_CUTS), method="")
+    most = thickness(meshes.a, meshes.b, meshes.T, meshes.shared, _is_sharp, FEW_CUTS)
+    return replace(own, lower=-meshes.hidden - most, method="")
 
 
 def _is_sharp(bound: float, reached: float) -> bool:
@@ -245,7 +243,7 @@ def _fine_chord(model: Model) -> float:
 
 def _way_by_meshes(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:
     """Length (mm) and direction (3,) of a translation of ``b`` after which meshes are apart."""
-    a, b, T, shared, _ = meshes
+    a, b, T, shared = meshes.a, meshes.b, meshes.T, meshes.shared
     off = a.error + b.error + rounding_of(a, b, T)
     slack = 2.0 * off
     # Where two faces hold a body, as a V does, its way out is between their normals.

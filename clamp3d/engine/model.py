@@ -338,24 +338,22 @@ class MeshModel(Model):
         return fit_mesh(self.shape.mesh)
 
     @cached_property
-    def _cylinder(self) -> Rod | None:
-        """The cylinder that the fit takes all of the mesh for; None if some of it is something else."""
-        if not self.is_simple or self._fit is None or not self._fit.features:
-            return None
-        match self.bodies:
-            case (ClosedForm(outers=(Rod() as rod,), bores=(), surface=None),):
-                return rod
+    def _cylinder(self) -> tuple[Rod, float] | None:
+        """The cylinder that the fit takes all of the mesh for, and its error (mm); None if some is something else."""
+        match self.bodies if self._fit is not None else None:
+            case (ClosedForm(outers=(Rod() as rod,), bores=(), error=error, surface=None),):
+                return rod, error
         return None
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
-        if self._cylinder is None or self.bodies is None:
+        if self._cylinder is None:
             return self._facets
-        mesh = (enclosed if inside else enclosing)(cylinder(self._cylinder.radius, self._cylinder.length), chord)
+        rod, error = self._cylinder
+        mesh = (enclosed if inside else enclosing)(cylinder(rod.radius, rod.length), chord)
         if mesh is None:
             return None
         vertices, faces = mesh
-        error = np.full(len(faces), self.bodies[0].error)
-        return Surface(to_target(self._cylinder.T, vertices), faces, error)
+        return Surface(to_target(rod.T, vertices), faces, np.full(len(faces), error))
 
     @cached_property
     def _facets(self) -> Surface:

@@ -66,9 +66,13 @@ class CommandLog:
         data: Command = command.lower()
         if data["type"] == "set_object" and not data["object"]["materials"][0].get("depthTest", True):
             data["object"]["object"].setdefault("renderOrder", FRONT)
-        self.add(data)
+        self.forward(data)
+
+    def forward(self, command: Command) -> None:
+        """Keep ``command``, and pass it on to the server, if there is one."""
+        self.add(command)
         if self._server is not None:
-            self._server.send(data)
+            self._server.send(command)
 
     def add(self, command: Command) -> None:
         """Keep ``command``."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ class SceneDrawing:
     """Sends a story's parts to ``log`` at once, each stop of its time line by `show`, and the animation at the end."""
 
     def __init__(self, story: Story, log: CommandLog, mesh_error: float, overlays: Mapping[str, Pieces]) -> None:
-        self._eye = np.array(_CORNER if story.anchors is None else _FRONT)
+        self._log, self._eye = log, np.array(_CORNER if story.anchors is None else _FRONT)
         self._world = Visualizer.view_into(log, Path())
         self._root = self._world["clamp3d"]
         placed = place(story.scene)
@@ -116,7 +115,7 @@ class SceneDrawing:
             # would be first, and the transforms after it would take the parts back to the start of what already plays.
             animation = SetAnimation(self.timeline.animation(self._root, self.paths, _MARKS)).lower()
             animation["path"] = self._root["animation"].path.lower()
-            self._world.window.send(SimpleNamespace(lower=lambda: animation))
+            self._log.forward(animation)
 
     def frame(self, low: Array, high: Array) -> None:
         """Put the camera in front of a box."""

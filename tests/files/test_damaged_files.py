@@ -4,6 +4,7 @@ import os
 import struct
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -53,6 +54,13 @@ def refused(path, message, **options):
         ("a.stl", b"solid".ljust(80) + PIN[80:-7], "cut off or damaged"),
         ("a.stl", b"", "no triangles"),
         ("a.stl", bytes(84), "no triangles"),
+        ("a.stl", PIN[:80] + struct.pack("<I", 2**32 - 1) + PIN[84:], "cut off or damaged"),
+        ("a.stl", PIN[:60], "cut off or damaged"),
+        ("a.stl", PIN[:146] + struct.pack("<f", np.inf) + PIN[150:], "not finite"),
+        ("a.stl", TEXT[: len(TEXT) // 2], "cut off"),
+        ("a.stl", TEXT + TEXT[:80], "cut off"),
+        ("a.stl", TEXT.replace(b"0.05", b"nan", 1), "not finite"),
+        ("a.off", OFF, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
         ("a.stl", PIN[:146] + struct.pack("<f", np.nan) + PIN[150:], "not finite"),
         ("a.stl", PIN[:146] + struct.pack("<f", 3e38) + PIN[150:], r"not within 1e\+12 mm"),
         ("a.stl", TEXT.replace(b"endsolid", b""), "cut off"),
@@ -161,6 +169,12 @@ def test_a_turn_of_six_digits_is_a_turn(tmp_path):
     np.testing.assert_allclose(part.T_world[:3, :3] @ part.T_world[:3, :3].T, np.eye(3), atol=1e-14)
 
 
+def test_a_3mf_whose_numbers_were_changed_on_the_way_is_refused(tmp_path):
+    path = write_3mf(tmp_path / "a.3mf", method=zipfile.ZIP_STORED)
+    path.write_bytes(path.read_bytes().replace(b'x="1"', b'x="9"'))
+    refused(path, "not a readable 3MF file")
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
 def test_a_mesh_that_takes_too_much_memory_or_time(tmp_path, monkeypatch):
     trimesh.creation.icosphere(5).export(tmp_path / "a.obj")
@@ -224,6 +238,11 @@ BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="t
         ('<link name="tip">', "<link>", "not a readable URDF file"),
         ("sphere radius", "ball radius", "not a readable URDF file .*ball"),
         (BASE, "", "each collision of a link must have 1 shape, got 0"),
+        (ROBOT[300:], "", "not a readable URDF file"),
+        (SLIDE, '<parent link="tip"/><child link="tip"/>', "one tree of all links"),
+        (BASE, '<mesh filename="../../no.stl"/>', "no such file in the robot's folder"),
+        ('radius="0.01"', 'radius="big"', "not a readable URDF file"),
+        ('"turn" type="revolute"', '"turn"', "type of joint turn must be one of revolute, .*got None"),
         (BASE, BASE + BASE, "each collision of a link must have 1 shape, got 2"),
         ('<mesh filename="rail.stl" scale="0.001 0.001 0.001"/>', "", "each visual of a link must have 1 shape, got 0"),
         ("</collision></link>", '</collision><link name="in"/></link>', "a link holds another link"),

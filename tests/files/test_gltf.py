@@ -94,6 +94,12 @@ def test_nodes_are_parts_with_names_places_and_shared_shapes(tmp_path):
     np.testing.assert_allclose([V.min(axis=0), V.max(axis=0)], [every.min(axis=0), every.max(axis=0)], atol=1e-2)
 
 
+def test_materials_do_not_divide_a_body(tmp_path):
+    mesh = only(tmp_path, lambda g: g.cube(F=CUBE.faces[:5]), lambda g: g.cube(F=CUBE.faces[5:]))
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(6.0)
+
+
 def test_strips(tmp_path):
     """A prism over five corners: its caps as strips, its walls as triangles without an index."""
     angle = np.linspace(0.0, 2 * np.pi, 5, endpoint=False)

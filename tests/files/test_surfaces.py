@@ -12,7 +12,7 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from clamp3d import Verdict, check, load
 from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
-from clamp3d.files.open_cascade import explore, occ, to_bytes
+from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
 from clamp3d.files.tessellation import _deviation, tessellate, triangles_of
 from tests.cad import array_of, ball, block, cone, cut, first_solid, location, moved, random_pose, ring, rod, turn
 from tests.files.assemblies import write_step
@@ -29,6 +29,12 @@ SOLIDS = {
 
 def as_splines(shape):
     return occ.BRepBuilderAPI_NurbsConvert(shape, True).Shape()
+
+
+def off_face(face, points):
+    """Distance (k,) of points (k, 3) from a face by Open CASCADE, mm."""
+    vertices = (occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex() for point in points)
+    return np.array([occ.BRepExtrema_DistShapeShape(face, vertex).Value() for vertex in vertices])
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -144,6 +150,13 @@ def test_no_triangle_is_further_from_its_face_nor_the_face_from_it_than_its_erro
         points = shares @ made.vertices[made.faces[rows]]
         square, *_ = point_mesh_squared_distance(points.reshape(-1, 3), fine.vertices, its)
         assert (np.sqrt(square).reshape(len(points), -1).max(axis=1) <= made.errors[rows] + 0.008).all()
+    every, rng = [*explore(from_bytes(brep), "FACE")], np.random.default_rng(5)
+    curved = np.flatnonzero(made.errors > 1e-9)
+    for row in curved[np.argsort(made.errors[curved])[:: max(1, len(curved) // 30)]]:
+        corners = made.vertices[made.faces[row]]
+        middles = 0.5 * (corners + np.roll(corners, 1, axis=0))
+        points = np.vstack([rng.dirichlet(np.ones(3), 9) @ corners, corners.mean(axis=0), middles])
+        assert off_face(every[made.face[row]], points).max() <= made.errors[row] + 1e-7
     assert made.errors.max() < 0.15
 
 
@@ -198,6 +211,14 @@ def test_a_face_is_as_near_to_its_triangles_as_said_between_the_middles_of_their
     made = tessellate(to_bytes(face), 0.1)
     true = np.array([surface.Value(u, v).Coord() for u in np.linspace(0, 1, 41) for v in np.linspace(0, 1, 41)])
     assert beyond(true, made, np.arange(len(made.faces))) <= 0.6  # what is seen of a spline counts twice
+
+
+def test_a_pin_that_stands_in_a_crowned_face_clashes(tmp_path):
+    """Between their edges the coarse triangles of the face are 0.15 mm off it."""
+    plate = occ.BRepPrimAPI_MakePrism(patch(CROWN)[1], occ.gp_Vec(0.0, 0.0, -5.0)).Shape()
+    parts = {"plate": plate, "pin": block((4.95, 9.95, 0.4), (5.05, 10.05, 8.0))}  # the face is at 0.45 mm there
+    (row,) = check(load(write_step(parts, tmp_path / "crown.step")), depths=False).pairs
+    assert row.verdict is Verdict.CLASH
 
 
 def test_a_bump_that_stands_in_another_part_clashes(tmp_path):

@@ -18,12 +18,12 @@ SOLID = f"<mesh><vertices>{CORNERS}</vertices><triangles>{SIDES}</triangles></me
 TIP = f'<object id="1" type="model" name="tip">{SOLID}</object>'
 
 
-def write_3mf(path, objects=TIP, build='<item objectid="1"/>', unit="millimeter"):
+def write_3mf(path, objects=TIP, build='<item objectid="1"/>', unit="millimeter", method=zipfile.ZIP_DEFLATED):
     model = (
         f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
         f"<resources>{objects}</resources><build>{build}</build></model>"
     )
-    with zipfile.ZipFile(path, "w") as archive:
+    with zipfile.ZipFile(path, "w", method) as archive:
         for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS), ("3D/part.model", model)):
             archive.writestr(name, '<?xml version="1.0" encoding="UTF-8"?>' + text)
     return path

@@ -176,9 +176,9 @@ def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, main):
     assert "mesh pin.stl of 216 triangles" in (tmp_path / "pin" / "report.html").read_text()
 
 
-def test_every_output_says_the_same():
-    """Of wires other than the reference clamp's."""
-    found = make_report(assemble(line="LGJ-240/40", jumper="12.5"))
+@pytest.mark.parametrize("wires", [{}, {"line": "LGJ-240/40", "jumper": "12.5"}])
+def test_every_output_says_the_same(wires, reference_report):
+    found = make_report(assemble(**wires)) if wires else reference_report
     assembly = found.assembly
     truth = measure(assembly.scene)
     assert len(truth) == 21
