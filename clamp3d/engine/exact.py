@@ -17,7 +17,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.files.pairs import CommonPart
-from clamp3d.geometry.pose import Array, to_source
+from clamp3d.geometry.pose import Array, to_source, to_target
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
@@ -71,6 +71,17 @@ def attested_overlap(points: Array, depths: Array) -> Distance:
     overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, 0.0)
     k = int(np.argmax(overlaps))
     return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
+
+
+def exact_height(inner: Surface, outer: Surface, solid: Model, T: Array) -> float:
+    """How far (mm) corners of a mesh, which lie on its solid, stand out of another ``solid`` that it may lie in.
+
+    ``outer`` is a mesh of that: what stands out most of it is measured, with ``inner`` placed by ``T`` (4, 4).
+    """
+    points = to_target(T, inner.vertices)
+    away = outer.distance(points)
+    order = np.argsort(np.where(outer.contains(points), away, -away), kind="stable")
+    return -float(solid.depth(points[order[:_MANY]]).min())
 
 
 def exact_overlap(

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import depth_of_pieces
+from clamp3d.engine.exact import exact_height
 from clamp3d.engine.mesh_distance import within
 from clamp3d.engine.model import Model, box_corners
 from clamp3d.engine.refine import Enough, refine
 from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
-from clamp3d.files import cad_process
+from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array, inverse, to_target
 
 
@@ -78,8 +79,11 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
         return False
     inner.counters.queries["containment"] += 1
     both_exact = inner.exact is not None and outer.exact is not None
-    for level in (0,) if both_exact else (0, -1):  # coarse meshes mostly tell that it does not
-        small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
+    for level in (0, -1) if inner.refines or outer.refines else (0,):  # coarse meshes mostly tell that it does not
+        try:
+            small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])
+        except Clamp3dError:  # fine ones of solids from CAD may take too long to make
+            continue
         if large is None:  # its walls are thinner than the chord error
             continue
         # Meshes around and inside of drawn solids are off by their chords.
@@ -88,11 +92,7 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
             return False
     if large is None:
         return False
-    if inner.exact is None or outer.exact is None:
-        return True
-    # Meshes are coarser than the threshold: what is shared must be all of the inner one but a skin.
-    shared = cad_process.common(outer.exact.brep, inner.exact.brep, T)
-    return shared.volume >= inner.exact.volume - contact * shared.area
+    return not both_exact or exact_height(small, large, outer, T) <= contact
 
 
 def may_hold(inner: Model, outer: Model, T: Array, contact: float) -> NDArray[np.bool_]:

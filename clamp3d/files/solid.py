@@ -9,13 +9,7 @@ import numpy as np
 
 from clamp3d.files import cad_process
 from clamp3d.files.faces import Surfaces
-from clamp3d.files.open_cascade import (
-    bounds_of,
-    from_bytes,
-    require_open_cascade,
-    to_bytes,
-    volume_of,
-)
+from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
 from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import Array, IntArray, Mesh, is_closed
 from clamp3d.geometry.shapes import MeshShape
@@ -37,23 +31,20 @@ class BrepSolid(MeshShape):
         The solid in its own frame, mm, in Open CASCADE's binary format (BinTools), without triangles.
     bounds : ndarray (2, 3)
         Lower and upper corner of a box that holds it, mm.
-    volume : float
-        Its volume, mm^3.
     """
 
-    def __init__(self, name: str, brep: bytes, bounds: Array, volume: float) -> None:
+    def __init__(self, name: str, brep: bytes, bounds: Array) -> None:
         for key, value in (("name", name), ("fit", "off")):
             object.__setattr__(self, key, value)
-        self.__dict__.update(brep=brep, bounds=np.asarray(bounds, dtype=np.float64), volume=float(volume))
+        self.__dict__.update(brep=brep, bounds=np.asarray(bounds, dtype=np.float64))
         self.__dict__["_tessellations"] = {}
 
     brep: bytes
     bounds: Array
-    volume: float
     _tessellations: dict[float, Tessellation]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.name, self.brep, self.bounds, self.volume)
+        return type(self), (self.name, self.brep, self.bounds)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, BrepSolid) and self.brep == other.brep
@@ -64,7 +55,7 @@ class BrepSolid(MeshShape):
     @classmethod
     def of(cls, solid: Any, name: str) -> BrepSolid:
         """From a TopoDS_Shape, in this process."""
-        return cls(name, to_bytes(solid), bounds_of(solid), abs(volume_of(solid)))
+        return cls(name, to_bytes(solid), bounds_of(solid))
 
     @cached_property
     def solid(self) -> Any:

@@ -18,7 +18,7 @@ from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.files.open_cascade import bounds_of, moved, occ, to_bytes, volume_of
+from clamp3d.files.open_cascade import moved, occ, volume_of
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.profile import check_mesh_error
@@ -228,8 +228,7 @@ def _shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error
 
 def _exact_common(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
     shape: Any = occ.BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in (a, b))).Shape()
-    volume = volume_of(shape)
-    return BrepSolid(name, to_bytes(shape), bounds_of(shape), volume) if volume > 0.0 else None
+    return BrepSolid.of(shape, name) if volume_of(shape) > 0.0 else None
 
 
 def _faceted_common(name: str, a: PlacedPart, b: PlacedPart, mesh_error: float) -> MeshShape | None:

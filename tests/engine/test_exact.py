@@ -187,6 +187,22 @@ def test_solids_from_cad_that_all_but_fill_each_other(off, verdict):
         assert kind_of_overlap(a, b, np.eye(4), 0.01).value == verdict
 
 
+@pytest.mark.parametrize(("out", "verdict"), [(0.009, "contained"), (0.012, "clash")])
+@pytest.mark.parametrize(
+    "make", [lambda: block((-50, -50, -50), (50, 50, 40)), lambda: ball(40.0), lambda: rod(30.0, -40.0, 40.0)]
+)
+def test_how_much_of_a_large_solid_stands_out_of_another_says_whether_that_holds_it(make, out, verdict):
+    """Not how much of its volume: of a large part that is little."""
+    a, b = models_of(make(), block((-100, -100, -200), (100, 100, 40 - out)))
+    assert kind_of_overlap(a, b, np.eye(4), 0.01).value == verdict
+    assert kind_of_overlap(b, a, np.eye(4), 0.01).value == verdict
+
+
+def test_a_ball_of_splines_is_the_duplicate_of_the_ball():
+    a, b = models_of(ball(40.0), occ.BRepBuilderAPI_NurbsConvert(ball(40.0), True).Shape())
+    assert kind_of_overlap(a, b, np.eye(4), 0.01).value == "duplicate"
+
+
 def test_a_common_part_leaves_the_solids_as_they_were():
     """Open CASCADE widens the tolerances of what it is given, and makes coarse triangles of that."""
     ball, cone = (model.exact.brep for model in models("ball_in_cone", -0.005))
