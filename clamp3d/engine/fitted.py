@@ -12,8 +12,7 @@ from clamp3d.engine.closed_form import Bore, ClosedForm
 from clamp3d.engine.convex import Rod
 from clamp3d.engine.hull import hull
 from clamp3d.engine.surface import Surface
-from clamp3d.fit.features import FittedSurface
-from clamp3d.fit.fit import FitResult
+from clamp3d.fit.features import FitResult, FittedSurface
 from clamp3d.geometry.pose import Array, to_source, to_target, translation
 
 Faces = NDArray[np.int64]

@@ -29,7 +29,7 @@ from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid, cylinder
 
 if TYPE_CHECKING:
-    from clamp3d.fit.fit import FitResult
+    from clamp3d.fit.features import FitResult
 
 Progress = Callable[[str, int, int], None]
 """What is being done, how much of it is, and of how much."""
@@ -264,7 +264,7 @@ class CadModel(Model):
         if not (self.shape.surfaces.kind == CYLINDER).any():
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
-        from clamp3d.fit.fit import fit_solid
+        from clamp3d.fit.cad import fit_solid
 
         fit = fit_solid(self.shape)
         if not fit.features:

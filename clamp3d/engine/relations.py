@@ -96,7 +96,8 @@ def round_faces(shape: Shape) -> tuple[RoundFace, ...]:
             RoundFace(np.array([[*arc.centre, end] for end in (body.start, body.end)]) @ body.frame.T, arc.radius, hole)
             for body, arc, hole in rounds
         )
-    from clamp3d.fit.fit import fit_mesh, fit_solid
+    from clamp3d.fit.cad import fit_solid
+    from clamp3d.fit.fit import fit_mesh
 
     if not isinstance(shape, MeshShape) or not (isinstance(shape, BrepSolid) or shape.fit == "round"):
         return ()

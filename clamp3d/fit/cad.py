@@ -11,14 +11,19 @@ import numpy as np
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.faces import CYLINDER, KINDS, PLANE
 from clamp3d.files.solid import BrepSolid
-from clamp3d.fit.cylinder import Axis, frame, upward
-from clamp3d.fit.surface import covered
+from clamp3d.fit.axis import Axis, covered, frame, upward
+from clamp3d.fit.features import FitResult, result_of
 from clamp3d.geometry.mesh import Array, IntArray, Mesh
 from clamp3d.geometry.pose import to_source, to_target
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one: ten times what CAD counts as one point, 1e-7 mm."""
 _NEAR_END = 0.8  # part of half an extent beyond which a border edge belongs to that end; chosen
+
+
+def fit_solid(solid: BrepSolid) -> FitResult:
+    """The cylindrical faces of a solid from CAD, with its own mesh."""
+    return result_of(*cad_features(Reading([Body(solid.name, solid, np.eye(4))]), solid.name))
 
 
 def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, dict[str, Any]]], list[str]]:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.geometry.mesh import IntArray
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.mesh import Array, IntArray, Mesh
+from clamp3d.geometry.pose import to_source
 from clamp3d.geometry.primitives import Cylinder, SweptArc
+from clamp3d.geometry.triangles import normals_and_areas
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -131,3 +132,87 @@ class HoleFit(FittedSurface):
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists for JSON."""
         return {**super(HoleFit, self).to_dict(), "through": self.through}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitResult:
+    """What was found in a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh that was fitted.
+    grooves : tuple of GrooveFit
+        Concave arcs, largest covered area first.
+    cylinders : tuple of CylinderFit
+        Convex cylinders and arcs, largest covered area first.
+    holes : tuple of HoleFit
+        Concave cylinders all the way round, largest covered area first.
+    area : float
+        Area of the mesh in mm^2.
+    notes : tuple of str
+        What was repaired, assumed, or not found.
+    """
+
+    mesh: Mesh
+    grooves: tuple[GrooveFit, ...]
+    cylinders: tuple[CylinderFit, ...]
+    holes: tuple[HoleFit, ...]
+    area: float
+    notes: tuple[str, ...]
+
+    @property
+    def features(self) -> tuple[FittedSurface, ...]:
+        """Grooves, cylinders and holes in this order."""
+        return (*self.grooves, *self.cylinders, *self.holes)
+
+    @property
+    def feature_area(self) -> float:
+        """Area (mm^2) of the triangles that belong to a feature."""
+        return float(sum(f.covered_area for f in self.features))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists for JSON; lengths in mm."""
+        low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+        return {
+            "mesh": self.mesh.name,
+            "vertices": len(self.mesh.vertices),
+            "triangles": len(self.mesh.faces),
+            "watertight": self.mesh.watertight,
+            "bounds_mm": [low.tolist(), high.tolist()],
+            "area_mm2": self.area,
+            "feature_area_mm2": self.feature_area,
+            **{kind: [f.to_dict() for f in getattr(self, kind)] for kind in ("grooves", "cylinders", "holes")},
+            "notes": list(self.notes),
+        }
+
+
+def result_of(mesh: Mesh, surfaces: list[tuple[float, dict[str, Any]]], notes: list[str]) -> FitResult:
+    """The features with the sense and the values of ``surfaces``, named."""
+    corners = mesh.vertices[mesh.faces]
+    grooves: list[GrooveFit] = []
+    cylinders: list[CylinderFit] = []
+    holes: list[HoleFit] = []
+    for sign, values in sorted(surfaces, key=lambda x: -x[1]["covered_area"]):
+        if sign > 0:
+            cylinders.append(CylinderFit(name=f"C{len(cylinders) + 1}", **values))
+        elif values["half_angle"] < np.pi:
+            grooves.append(GrooveFit(name=f"G{len(grooves) + 1}", **values))
+        else:
+            holes.append(HoleFit(name=f"H{len(holes) + 1}", **values, through=_open_ended(corners, values)))
+    if not grooves:
+        notes = [*notes, "no groove: no concave circular arc found"]
+    area = float(normals_and_areas(corners)[1].sum())
+    return FitResult(mesh, tuple(grooves), tuple(cylinders), tuple(holes), area, tuple(notes))
+
+
+def _open_ended(corners: Array, values: dict[str, Any]) -> bool:
+    """True if nothing closes either end: from the middle, no face crosses the axis up to a radius past the ends."""
+    T, reach = values["T_part_feature"], 0.5 * values["length"] + values["radius"]
+    x, y, z = np.moveaxis(to_source(T, corners), -1, 0)
+    # A face meets the axis if the origin lies in its projection along z: all three edge functions of one sign.
+    e = np.roll(x, -1, axis=1) * np.roll(y, -2, axis=1) - np.roll(y, -1, axis=1) * np.roll(x, -2, axis=1)
+    total = e.sum(axis=1)
+    hit = ((e >= 0).all(axis=1) | (e <= 0).all(axis=1)) & (total != 0.0)
+    z = (e * z).sum(axis=1)[hit] / total[hit]
+    return not bool((np.abs(z) <= reach).any())

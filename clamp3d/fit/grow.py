@@ -9,8 +9,9 @@ import numpy as np
 from scipy.ndimage import maximum, minimum
 from scipy.special import stdtrit
 
-from clamp3d.fit.cylinder import Axis, fit_axis, perpendicular
-from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, angles, border, turned
+from clamp3d.fit.axis import Axis, perpendicular, turned
+from clamp3d.fit.cylinder import fit_axis
+from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface, angles, border
 from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.profile import sagitta

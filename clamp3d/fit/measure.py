@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from clamp3d.fit.cylinder import CONFIDENCE, Axis, covariance, frame, perpendicular, surface_error, upward
+from clamp3d.fit.axis import Axis, covered, frame, perpendicular, turned, upward
+from clamp3d.fit.cylinder import CONFIDENCE, covariance, surface_error
 from clamp3d.fit.grow import Region
-from clamp3d.fit.surface import BoolArray, Surface, angles, border, covered, turned
+from clamp3d.fit.surface import BoolArray, Surface, angles, border
 from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.pose import Array, to_source
 from clamp3d.geometry.profile import sagitta

@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from clamp3d.fit.cylinder import Axis, axis_along, fit_axis, perpendicular
+from clamp3d.fit.axis import Axis, perpendicular
+from clamp3d.fit.cylinder import axis_along, fit_axis
 from clamp3d.fit.grow import Region, Search, accept, grow
 from clamp3d.fit.surface import MAX_FACET, BoolArray, Surface
 from clamp3d.geometry.mesh import IntArray

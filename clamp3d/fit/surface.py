@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from clamp3d.fit.cylinder import Axis
+from clamp3d.fit.axis import Axis
 from clamp3d.geometry.mesh import Array, IntArray, Mesh
 
 BoolArray = NDArray[np.bool_]
@@ -78,22 +78,3 @@ def angles(surface: Surface, axis: Axis, faces: IntArray, u: Array, w: Array) ->
     """Angles (k, 3) of the corners of ``faces`` (k,) about the axis, rad from u towards w."""
     p = surface.V[surface.F[faces]] - axis.point
     return np.asarray(np.arctan2(p @ w, p @ u))
-
-
-def turned(angle: Array, base: Array) -> Array:
-    """Angles from ``base``, in [-pi, pi)."""
-    return np.asarray((angle - base + np.pi) % (2.0 * np.pi) - np.pi)
-
-
-def covered(u: Array, least: float) -> tuple[float, float]:
-    """Middle and half of the arc that triangles' angles (m, 3) cover, rad; half a turn if no gap is ``least`` wide."""
-    start = np.remainder(u.min(axis=1), 2.0 * np.pi)
-    order = np.argsort(start, kind="stable")
-    start, end = start[order], (start + np.ptp(u, axis=1))[order]
-    reached = np.maximum.accumulate(end)
-    gaps = np.append(start[1:], start[0] + 2.0 * np.pi) - np.maximum(reached, reached[-1] - 2.0 * np.pi)
-    k = int(np.argmax(gaps))
-    if gaps[k] < least:
-        return 0.0, np.pi
-    half = np.pi - 0.5 * float(gaps[k])
-    return float(reached[k] + gaps[k]) + half, half

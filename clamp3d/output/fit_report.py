@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.fit.features import CylinderFit, FittedSurface, GrooveFit, HoleFit
-from clamp3d.fit.fit import FitResult
+from clamp3d.fit.features import CylinderFit, FitResult, FittedSurface, GrooveFit, HoleFit
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import counted

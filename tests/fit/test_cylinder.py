@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from clamp3d.fit.cylinder import Axis, covariance, fit_axis, surface_error
+from clamp3d.fit.axis import Axis
+from clamp3d.fit.cylinder import covariance, fit_axis, surface_error
 from clamp3d.kernel import rotation
 
 
