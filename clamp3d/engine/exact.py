@@ -11,6 +11,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
+from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
@@ -28,11 +29,16 @@ _NARROW, _HIDING = 9e-3, 0.01
 """Overlap (mm) allowed for where Open CASCADE finds none, and chord error of meshes whose points would show it."""
 
 
-def exact_distance(a: Model, b: Model, T: Array) -> Distance:
-    """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least."""
+def exact_distance(a: Model, b: Model, T: Array, most: float = np.inf) -> Distance:
+    """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least.
+
+    Raises Clamp3dError where there are more than ``most`` pairs of edges to look at.
+    """
     assert a.exact is not None
     assert b.exact is not None
-    nearest = cad_process.distance(a.exact.brep, b.exact.brep, T)
+    meshes = a.face_meshes, b.face_meshes
+    near = None if meshes[0] is None or meshes[1] is None else near_faces(meshes[0], meshes[1], T)
+    nearest = cad_process.distance(a.exact.brep, b.exact.brep, T, near, most)
     gap, way = nearest.distance, nearest.q - nearest.p
     lower = gap - TOLERANCE if nearest.is_least and (gap > TOLERANCE or nearest.is_signed) else -np.inf
     normal = way / np.linalg.norm(way) if lower > 0.0 else None

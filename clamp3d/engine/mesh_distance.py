@@ -14,22 +14,17 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
+from clamp3d.engine.near_faces import TURN
 from clamp3d.engine.overlap import common, deepest, thickness
 from clamp3d.engine.surface import Surface, fcl_pair
 from clamp3d.geometry.manifolds import arrays_of
-from clamp3d.geometry.pose import Array, inverse, rotation, to_source, to_target
+from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
 Enough = Callable[[Distance], bool]
 
 CUTS, FEW_CUTS = 100_000, 20_000
 """Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much
 less where Open CASCADE can be asked next.
-"""
-_TURN = rotation((3.0, 4.0, 5.0), 1e-13)
-"""By so much, which is less than is rounded, one of two meshes is turned before FCL measures their distance.
-
-FCL 0.7 may stop at any two edges that are parallel to the last bit: their cross product is zero, and proves nothing. Of
-a triangle over another whose sides are parallel to its own one distance in ten was too large, by up to their size.
 """
 _HALVINGS = 30
 """Halvings of the way between two nearest points after which the true surface on it is known to rounding."""
@@ -125,7 +120,7 @@ def are_apart(a: Surface, b: Surface, T: Array) -> bool:
     rounding = rounding_of(a, b, T)
     if surfaces_meet(a, b, T):
         return False
-    gap = float(fcl.distance(*fcl_pair(a.bvh, b.bvh, T @ _TURN), fcl.DistanceRequest(), fcl.DistanceResult()))
+    gap = float(fcl.distance(*fcl_pair(a.bvh, b.bvh, T @ TURN), fcl.DistanceRequest(), fcl.DistanceResult()))
     if gap <= rounding or (gap < a.error + b.error + rounding and nearest_points(a, b, T)[0] < rounding):
         return False
     return not (one_inside(a, b, T) or one_inside(b, a, inverse(T)))
@@ -153,7 +148,7 @@ def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Arra
     import fcl
 
     lower, best, points = np.inf, np.inf, (np.zeros(3), np.zeros(3))
-    turned = T @ _TURN
+    turned = T @ TURN
     for first, e in a.groups:
         for second, f in b.groups:
             answer = fcl.DistanceResult()

@@ -18,6 +18,7 @@ from clamp3d.engine.closed_form import ClosedForm
 from clamp3d.engine.convex import Rod
 from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
+from clamp3d.engine.near_faces import FaceMeshes
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
@@ -101,6 +102,11 @@ class Model:
     def bracketed(self) -> bool:
         """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
         return False
+
+    @cached_property
+    def face_meshes(self) -> FaceMeshes | None:
+        """The coarse triangles of a solid from CAD by its faces; None of other shapes, and where they do not close."""
+        return None
 
     @property
     def bounds(self) -> Array:
@@ -272,6 +278,13 @@ class CadModel(Model):
         tessellation = self.shape.tessellated(CHORD)
         flat = self.shape.surfaces.kind[tessellation.face] == PLANE
         return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
+
+    @cached_property
+    def face_meshes(self) -> FaceMeshes | None:
+        """The coarse triangles by their faces; None where they do not close."""
+        if not self.chords:
+            return None
+        return FaceMeshes(self.outer(CAD_CHORDS[0]), self.shape.tessellated(CAD_CHORDS[0]).face)
 
     def depth(self, points: Array) -> Array:
         """How deep (k,) mm points (k, 3) lie inside, by Open CASCADE; negative outside or where nobody knows."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import MissingLibraryError
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.mesh import Array, IntArray
 
 TOLERANCE = 1e-6
 """Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
@@ -90,6 +90,15 @@ def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
     while walk.More():
         yield cast(walk.Current())
         walk.Next()
+
+
+def faces_of(shape: Any, numbers: IntArray) -> Any:
+    """The faces with these numbers (k,), in the explorer's order, as one TopoDS_Shape."""
+    faces, builder, kept = list(explore(shape, "FACE")), occ.BRep_Builder(), occ.TopoDS_Compound()
+    builder.MakeCompound(kept)
+    for number in numbers.tolist():
+        builder.Add(kept, faces[number])
+    return kept
 
 
 def bounds_of(shape: Any) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from clamp3d.files.open_cascade import (
     area_of,
     bounds_of,
     explore,
+    faces_of,
     from_bytes,
     moved,
     occ,
@@ -83,17 +85,24 @@ class Nearest(NamedTuple):
         return self._replace(p=self.q, q=self.p)
 
 
-def distance(a: bytes, b: bytes, T: Array) -> Nearest:
-    """Distance of ``b`` at ``T`` (4, 4) in a's frame.
+def distance(
+    a: bytes, b: bytes, T: Array, near: tuple[IntArray, IntArray] | None = None, most: float = math.inf
+) -> Nearest:
+    """Distance of ``b`` at ``T`` (4, 4) in a's frame; of faces alone whose numbers are ``near``, if there are any.
 
     Open CASCADE does not always find the nearest points of a whole sphere (of two balls 0.04 mm in each other it said
-    0.05 mm apart): a ball is as near as its centre, less its radius. Raises Clamp3dError if it finds no distance.
+    0.05 mm apart): a ball is as near as its centre, less its radius. Raises Clamp3dError if it finds no distance,
+    and where there are more than ``most`` pairs of edges to look at.
     """
     first, second = from_bytes(a), moved(from_bytes(b), T)
     if (ball := _ball(a)) is not None and (nearest := _from_ball(*ball, second)) is not None:
         return nearest
     if (ball := _ball(b)) is not None and (nearest := _from_ball(to_target(T, ball[0]), ball[1], first)) is not None:
         return nearest.swapped()
+    if near is not None:
+        first, second = faces_of(first, near[0]), faces_of(second, near[1])
+    if math.prod(sum(1 for _ in explore(shape, "EDGE")) for shape in (first, second)) > most:
+        raise Clamp3dError("the two solids have too many edges near each other")
     nearest = _nearest(first, second)
     if nearest.distance <= TOLERANCE:
         return nearest

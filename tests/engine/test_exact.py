@@ -102,6 +102,19 @@ def test_a_depth_is_that_of_the_formula_and_its_translation_parts_the_solids(fam
     assert common_volume(pair.a, moved(pair.b, shift(*way))) == 0.0
 
 
+def test_the_faces_that_are_near_tell_the_distance_of_the_solids():
+    """Of a drum of 40 pins, at its side and in its hollow: the same as of all faces, and few are looked at."""
+    drum = cut(rod(30.0, 0.0, 20.0), rod(20.0, -1.0, 21.0))
+    for k in range(40):
+        drum = cut(drum, rod(1.0, -1.0, 21.0, 25.0 * np.cos(k * np.pi / 20), 25.0 * np.sin(k * np.pi / 20)))
+    for place in ((55.3, 0.4, 3.0), (0.3, 0.2, 0.0), (0.0, 50.2, 25.05)):
+        a, b = models_of(drum, moved(cut(rod(19.0, 1.0, 24.0), rod(3.0, 0.0, 30.0)), shift(*place)))
+        exact, every = exact_distance(a, b, np.eye(4)), pairs.distance(a.exact.brep, b.exact.brep, np.eye(4))
+        assert abs(exact.upper - 1e-6 - every.distance) < 1e-7
+        near = a.face_meshes.near(b.face_meshes.surface, np.eye(4), every.distance + 0.3)
+        assert len(near) < 0.5 * len(a.face_meshes.numbers)
+
+
 @pytest.mark.parametrize(("more", "is_least"), [(0.1, True), (0.0, False)])
 def test_a_gap_that_is_not_the_least_shortens_no_way(more, is_least, monkeypatch):
     measure = cad_process.distance

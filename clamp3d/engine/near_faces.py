@@ -1,0 +1,97 @@
+"""Which faces of two solids from CAD can be the nearest, by their coarse triangles: others need no exact distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.engine.surface import Surface, fcl_pair, fcl_tree
+from clamp3d.geometry.pose import Array, inverse, rotation, to_target
+
+TURN = rotation((3.0, 4.0, 5.0), 1e-13)
+"""By so much, which is less than is rounded, one of two meshes is turned before FCL measures their distance.
+
+FCL 0.7 may stop at any two edges that are parallel to the last bit: their cross product is zero, and proves nothing. Of
+a triangle over another whose sides are parallel to its own one distance in ten was too large, by up to their size.
+"""
+_FEW = 300
+"""Pairs of faces up to which Open CASCADE looks at all of them in less time than it takes to choose."""
+
+Faces = NDArray[np.int64]
+
+
+@dataclass(eq=False)
+class FaceMeshes:
+    """The triangles of a solid by its faces: ``face`` (m,) is the number of the face of each."""
+
+    surface: Surface
+    face: Faces
+    _trees: dict[int, Any] = field(default_factory=dict)
+
+    @cached_property
+    def numbers(self) -> Faces:
+        """The numbers (n,) of its faces."""
+        return np.unique(self.face)
+
+    @cached_property
+    def boxes(self) -> Array:
+        """Lower and upper corners (2, n, 3) of the faces' triangles."""
+        corners = self.surface.vertices[self.surface.faces]
+        order = np.argsort(self.face, kind="stable")
+        first = np.searchsorted(self.face[order], self.numbers)
+        low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
+        return np.array([np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)])
+
+    def tree(self, number: int) -> Any:
+        """FCL's tree of the triangles of a face."""
+        if number not in self._trees:
+            self._trees[number] = fcl_tree(self.surface.vertices, self.surface.faces[self.face == number])
+        return self._trees[number]
+
+    def near(self, other: Surface, T: Array, limit: float) -> Faces:
+        """The faces (k,) that are not certainly more than ``limit`` mm from another mesh placed by ``T`` (4, 4)."""
+        points = to_target(T, other.vertices)
+        low, high = self.boxes
+        gap = np.linalg.norm(np.maximum(np.maximum(low - points.max(axis=0), points.min(axis=0) - high), 0.0), axis=1)
+        rows = self.numbers[gap <= limit].tolist()
+        return np.array([k for k in rows if _distance(self.tree(k), other.bvh, T) <= limit], dtype=np.int64)
+
+
+def near_faces(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces] | None:
+    """The faces of two solids that can hold nearest points of their surfaces, ``b`` at ``T`` (4, 4) in a's frame.
+
+    None where there are few in all, where the triangles meet (Open CASCADE soon finds a point of one solid in the other
+    then), and where one solid may be inside the other.
+    """
+    if len(a.numbers) * len(b.numbers) <= _FEW:
+        return None
+    gap = _distance(a.surface.bvh, b.surface.bvh, T)
+    if gap <= 0.0:
+        return None
+    if not (_stands_out(b.surface, a.surface, T) and _stands_out(a.surface, b.surface, inverse(T))):
+        return None
+    off = a.surface.error + b.surface.error
+    # The solids are no further apart than their triangles and this, nor a face nearer than its triangles less this.
+    limit = gap + 2.0 * off
+    return a.near(b.surface, T, limit), b.near(a.surface, inverse(T), limit)
+
+
+def _distance(a: Any, b: Any, T: Array) -> float:
+    """Distance of two trees of FCL, mm; 0 or less where they meet."""
+    import fcl
+
+    return float(fcl.distance(*fcl_pair(a, b, T @ TURN), fcl.DistanceRequest(), fcl.DistanceResult()))
+
+
+def _stands_out(part: Surface, other: Surface, T: Array) -> bool:
+    """Whether some corner of a mesh, which lies on its solid, is certainly outside another; ``part`` is at ``T``."""
+    points = to_target(T, part.vertices)
+    slack = other.error + 1e-9 * (other.scale + part.scale)
+    if ((points < other.box[0] - slack) | (points > other.box[1] + slack)).any():
+        return True
+    away = points[other.distance(points) > slack]
+    return bool(len(away)) and not other.contains(away).all()
