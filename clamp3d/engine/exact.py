@@ -36,8 +36,7 @@ def exact_distance(a: Model, b: Model, T: Array, most: float = np.inf) -> Distan
     """
     assert a.exact is not None
     assert b.exact is not None
-    meshes = a.face_meshes, b.face_meshes
-    near = None if meshes[0] is None or meshes[1] is None else near_faces(meshes[0], meshes[1], T)
+    near = near_faces(a.face_meshes, b.face_meshes, T)
     nearest = cad_process.distance(a.exact.brep, b.exact.brep, T, near, most)
     gap, way = nearest.distance, nearest.q - nearest.p
     lower = gap - TOLERANCE if nearest.is_least and (gap > TOLERANCE or nearest.is_signed) else -np.inf

@@ -14,9 +14,8 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
-from clamp3d.engine.near_faces import TURN
 from clamp3d.engine.overlap import common, deepest, thickness
-from clamp3d.engine.surface import Surface, fcl_pair
+from clamp3d.engine.surface import TURN, Surface, fcl_pair, tree_distance
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
@@ -115,12 +114,10 @@ def _nothing(_: Distance) -> bool:
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:
     """Whether the true bodies of two meshes certainly do not overlap, ``b`` at ``T`` (4, 4) in a's frame."""
-    import fcl
-
     rounding = rounding_of(a, b, T)
     if surfaces_meet(a, b, T):
         return False
-    gap = float(fcl.distance(*fcl_pair(a.bvh, b.bvh, T @ TURN), fcl.DistanceRequest(), fcl.DistanceResult()))
+    gap = tree_distance(a.bvh, b.bvh, T)
     if gap <= rounding or (gap < a.error + b.error + rounding and nearest_points(a, b, T)[0] < rounding):
         return False
     return not (one_inside(a, b, T) or one_inside(b, a, inverse(T)))

@@ -9,15 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.engine.surface import Surface, fcl_pair, fcl_tree
-from clamp3d.geometry.pose import Array, inverse, rotation, to_target
+from clamp3d.engine.surface import Surface, fcl_tree, tree_distance
+from clamp3d.geometry.pose import Array, inverse, to_target
 
-TURN = rotation((3.0, 4.0, 5.0), 1e-13)
-"""By so much, which is less than is rounded, one of two meshes is turned before FCL measures their distance.
-
-FCL 0.7 may stop at any two edges that are parallel to the last bit: their cross product is zero, and proves nothing. Of
-a triangle over another whose sides are parallel to its own one distance in ten was too large, by up to their size.
-"""
 _FEW = 300
 """Pairs of faces up to which Open CASCADE looks at all of them in less time than it takes to choose."""
 
@@ -58,18 +52,18 @@ class FaceMeshes:
         low, high = self.boxes
         gap = np.linalg.norm(np.maximum(np.maximum(low - points.max(axis=0), points.min(axis=0) - high), 0.0), axis=1)
         rows = self.numbers[gap <= limit].tolist()
-        return np.array([k for k in rows if _distance(self.tree(k), other.bvh, T) <= limit], dtype=np.int64)
+        return np.array([k for k in rows if tree_distance(self.tree(k), other.bvh, T) <= limit], dtype=np.int64)
 
 
-def near_faces(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces] | None:
+def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Faces, Faces] | None:
     """The faces of two solids that can hold nearest points of their surfaces, ``b`` at ``T`` (4, 4) in a's frame.
 
-    None where there are few in all, where the triangles meet (Open CASCADE soon finds a point of one solid in the other
-    then), and where one solid may be inside the other.
+    None where triangles are missing, where there are few faces in all, where the triangles meet (Open CASCADE soon finds
+    a point of one solid in the other then), and where one solid may be inside the other.
     """
-    if len(a.numbers) * len(b.numbers) <= _FEW:
+    if a is None or b is None or len(a.numbers) * len(b.numbers) <= _FEW:
         return None
-    gap = _distance(a.surface.bvh, b.surface.bvh, T)
+    gap = tree_distance(a.surface.bvh, b.surface.bvh, T)
     if gap <= 0.0:
         return None
     if not (_stands_out(b.surface, a.surface, T) and _stands_out(a.surface, b.surface, inverse(T))):
@@ -78,13 +72,6 @@ def near_faces(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces] | 
     # The solids are no further apart than their triangles and this, nor a face nearer than its triangles less this.
     limit = gap + 2.0 * off
     return a.near(b.surface, T, limit), b.near(a.surface, inverse(T), limit)
-
-
-def _distance(a: Any, b: Any, T: Array) -> float:
-    """Distance of two trees of FCL, mm; 0 or less where they meet."""
-    import fcl
-
-    return float(fcl.distance(*fcl_pair(a, b, T @ TURN), fcl.DistanceRequest(), fcl.DistanceResult()))
 
 
 def _stands_out(part: Surface, other: Surface, T: Array) -> bool:
