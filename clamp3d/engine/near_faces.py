@@ -58,8 +58,8 @@ class FaceMeshes:
 def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Faces, Faces] | None:
     """The faces of two solids that can hold nearest points of their surfaces, ``b`` at ``T`` (4, 4) in a's frame.
 
-    None where triangles are missing, where there are few faces in all, where the triangles meet (Open CASCADE soon finds
-    a point of one solid in the other then), and where one solid may be inside the other.
+    None where triangles are missing, where there are few faces in all, where triangles meet (Open CASCADE soon finds a
+    point of one solid in the other then), and where one solid may be inside the other.
     """
     if a is None or b is None or len(a.numbers) * len(b.numbers) <= _FEW:
         return None

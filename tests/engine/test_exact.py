@@ -10,13 +10,15 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 from clamp3d import Scene, check
 from clamp3d.engine import moving_pair
+from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import _depth_bounds, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import Counters, model_of
+from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.refine import refine
-from clamp3d.engine.surface import Surface
+from clamp3d.engine.surface import Surface, tree_distance
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.engine.where import Locator
 from clamp3d.files import cad_process, pairs
@@ -24,7 +26,7 @@ from clamp3d.files.open_cascade import from_bytes, occ, to_bytes
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import to_target
+from clamp3d.geometry.pose import rotation, to_target
 from tests.cad import ball, block, common_volume, cone, cut, first_solid, moved, ring, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
 
@@ -102,17 +104,35 @@ def test_a_depth_is_that_of_the_formula_and_its_translation_parts_the_solids(fam
     assert common_volume(pair.a, moved(pair.b, shift(*way))) == 0.0
 
 
-def test_the_faces_that_are_near_tell_the_distance_of_the_solids():
-    """Of a drum of 40 pins, at its side and in its hollow: the same as of all faces, and few are looked at."""
-    drum = cut(rod(30.0, 0.0, 20.0), rod(20.0, -1.0, 21.0))
-    for k in range(40):
-        drum = cut(drum, rod(1.0, -1.0, 21.0, 25.0 * np.cos(k * np.pi / 20), 25.0 * np.sin(k * np.pi / 20)))
-    for place in ((55.3, 0.4, 3.0), (0.3, 0.2, 0.0), (0.0, 50.2, 25.05)):
-        a, b = models_of(drum, moved(cut(rod(19.0, 1.0, 24.0), rod(3.0, 0.0, 30.0)), shift(*place)))
-        exact, every = exact_distance(a, b, np.eye(4)), pairs.distance(a.exact.brep, b.exact.brep, np.eye(4))
-        assert abs(exact.upper - 1e-6 - every.distance) < 1e-7
-        near = a.face_meshes.near(b.face_meshes.surface, np.eye(4), every.distance + 0.3)
-        assert len(near) < 0.5 * len(a.face_meshes.numbers)
+def drum(angle=0.0):
+    """A ring of radius 30 with 40 holes along z, up to z = 20, turned by ``angle`` rad."""
+    solid = cut(rod(30.0, 0.0, 20.0), rod(20.0, -1.0, 21.0))
+    for turned in np.arange(40) * np.pi / 20 + 0.05:
+        solid = cut(solid, rod(1.0, -1.0, 21.0, 25.0 * np.cos(turned), 25.0 * np.sin(turned)))
+    return moved(solid, rotation((0.0, 0.0, 1.0), angle))
+
+
+@pytest.mark.parametrize("angle", np.radians([0.0, 2.0, 4.0, 6.0, 8.0]))
+def test_the_faces_that_are_near_tell_the_distance_of_the_solids(angle):
+    """By its coarse triangles the ring seems nearer to the roof, 0.33 mm above it, than to the wall, 0.3 mm beside."""
+    hook = cut(block((-10, -10, -5), (45, 10, 40)), block((-40, -40, -6), (30.3, 40, 20.33)))
+    a, b = models_of(drum(angle), hook)
+    near = near_faces(a.face_meshes, b.face_meshes, np.eye(4))
+    assert len(near[0]) < 0.7 * len(a.face_meshes.numbers)
+    distance = exact_distance(a, b, np.eye(4))
+    assert distance.lower - 1e-9 <= 0.3 <= distance.upper + 1e-9
+
+
+def test_a_wire_between_a_solid_and_its_triangles_is_inside_it(monkeypatch):
+    monkeypatch.setattr(near_faces_module, "_FEW", 0)
+    hidden = 0
+    for angle in np.radians(np.arange(0.0, 10.0)):
+        wire = rod(0.01, 5.0, 15.0, 29.97 * np.cos(angle), 29.97 * np.sin(angle))
+        a, b = models_of(drum(), wire)
+        hidden += tree_distance(*(model.face_meshes.surface.bvh for model in (a, b)), np.eye(4)) > 0.0
+        assert exact_distance(a, b, np.eye(4)).upper <= 1e-6
+        assert exact_distance(b, a, np.eye(4)).upper <= 1e-6
+    assert hidden
 
 
 @pytest.mark.parametrize(("more", "is_least"), [(0.1, True), (0.0, False)])
