@@ -71,9 +71,9 @@ def depths_in(a: Model, b: Model, T: Array, points: Array) -> Array:
 
 
 def attested_overlap(points: Array, depths: Array) -> Distance:
-    """The overlap that the deepest of points (k, 3) attests; one that lies beside a solid attests none."""
+    """The overlap that the deepest of points (k, 3) attests; where all lie beside a solid, nothing."""
     beside = np.minimum(depths.min(axis=0), 0.0)  # by so much it is moved into both solids, and less deep
-    overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, 0.0)
+    overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, -np.inf)
     k = int(np.argmax(overlaps))
     return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
 

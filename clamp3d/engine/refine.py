@@ -30,6 +30,8 @@ SHARES = (0.04, 0.015, 0.004)
 
 _QUICKLY = 15_000
 """Triangles of two fine meshes up to which they are made before Open CASCADE is asked, which takes as long then."""
+_COINCIDENT = 1e-4
+"""Overlap (mm) beyond which there is a common part to ask for; up to it faces coincide, which meshes prove."""
 
 Enough = Callable[[Distance], bool]
 
@@ -80,35 +82,47 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
 
 
 def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
-    """What meshes and Open CASCADE say of two solids from CAD.
-
-    Fine meshes, where they are small, prove that two solids touch in less time than Open CASCADE takes to find nothing
-    that they share.
-    """
-    from clamp3d.engine.exact import exact_distance, exact_overlap, exact_probe
+    """What meshes and Open CASCADE say of two solids from CAD: coarse meshes, points, and then what takes longer."""
+    from clamp3d.engine.exact import exact_distance, exact_probe
 
     chords = [chord for chord in a.chords if chord in b.chords]
-    is_large = len(chords) > 1 and a.fine_triangles + b.fine_triangles > _QUICKLY
-    quickly = 1 if is_large else len(chords)
-    for chord in chords[:quickly]:
+    for chord in chords[:1]:
         yield "meshes", _by_meshes(a, b, T, chord, enough)
-    yield "exact", exact_distance(a, b, T)
     probe = exact_probe(a, b, T)
     yield "exact", probe
-    quick = exact_overlap(a, b, T, SHARES[0], quick=True, attested=-probe.upper)
-    yield "exact", quick
-    attested = -min(probe.upper, quick.upper)
+    if not probe.upper < 0.0:  # else they overlap
+        yield "exact", exact_distance(a, b, T)
+    attested, finer = -probe.upper, chords[1:]
+    if attested <= _COINCIDENT and finer and a.fine_triangles + b.fine_triangles <= _QUICKLY:
+        while finer:
+            yield "meshes", _by_meshes(a, b, T, finer.pop(0), enough)
+    is_found = False
+    for overlap in _common_parts(a, b, T, attested, quick=True):
+        yield "exact", overlap
+        is_found = bool(np.isfinite(overlap.lower))
     if not cad_forms:
         yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
-    for chord in chords[quickly:]:
+    for chord in finer:
         yield "meshes", _by_meshes(a, b, T, chord, enough)
-    for share in SHARES[1 if np.isfinite(quick.lower) else 0 :]:
-        overlap = exact_overlap(a, b, T, share, attested=attested)
-        yield "exact", overlap
-        if np.isinf(overlap.lower):  # finer ones take longer
-            break
+    if not is_found:
+        for overlap in _common_parts(a, b, T, attested, quick=False):
+            yield "exact", overlap
     if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
         yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
+
+
+def _common_parts(a: Model, b: Model, T: Array, attested: float, *, quick: bool) -> Iterator[Distance]:
+    """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
+
+    ``quick``: the first, which makes it, within a second. ``attested``: how deep (mm) a point lies.
+    """
+    from clamp3d.engine.exact import exact_overlap
+
+    for share in SHARES[0 if quick else 1 :]:
+        overlap = exact_overlap(a, b, T, share, quick=quick and share == SHARES[0], attested=attested)
+        yield overlap
+        if np.isinf(overlap.lower):
+            break
 
 
 def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:

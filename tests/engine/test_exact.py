@@ -208,7 +208,7 @@ def test_points_that_refute_a_missing_common_part_say_how_deep_it_is(monkeypatch
 
 
 def test_a_point_a_little_beside_one_solid_attests_as_much_less():
-    for beside, overlap in ((0.0, 1e-4), (1.5e-6, 1e-4 - 1.5e-6), (3e-6, 0.0)):
+    for beside, overlap in ((0.0, 1e-4), (1.5e-6, 1e-4 - 1.5e-6), (3e-6, -np.inf)):  # the last not even that they touch
         found = attested_overlap(np.zeros((1, 3)), np.array([[-beside], [1e-4]]))
         assert found.upper == pytest.approx(1e-6 - overlap, abs=1e-12)
 
@@ -319,7 +319,7 @@ def test_that_faces_coincide_is_proven_by_meshes(family, splines):
     verdict, distance = judge(a, b, np.eye(4), Distance(level="boxes"), Thresholds(), None)
     assert (verdict.value, distance.level) == ("contact", "meshes")
     assert -0.01 <= distance.lower <= 0.0 <= distance.upper <= 0.01
-    assert a.counters.queries["exact"] == 0
+    assert a.counters.queries["exact"] == 2 * (a.counters.queries["meshes"] > 1)  # no common part
 
 
 @pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])

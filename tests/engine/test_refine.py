@@ -73,35 +73,39 @@ def test_what_counts_as_known():
 
 
 @pytest.mark.parametrize("found", [True, False])
-def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found):
-    """A common part that was found quickly is not asked for as coarsely again, nor are meshes that were measured."""
+@pytest.mark.parametrize("deep", [5.0, 2e-4, 1e-4, 0.0, -math.inf])
+def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, deep):
+    """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more."""
 
     def overlap(a, b, T, share, *, quick=False, attested):
-        return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick} {attested:g}")
+        assert attested == deep
+        return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick}")
 
     def meshes(a, b, T, chord, enough, *, thorough=False, cuts=None):
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
     monkeypatch.setattr(refine, "meshes_distance", meshes)
     monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
+    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    last = ["0.0018 ['thorough']"]
-    both = (0.1, 0.0018)
-    for first, second, triangles, quick, fine, end in (
-        (both, (0.1,), math.inf, ["0.1 []"], [], last),
-        (both, both, 7_500, ["0.1 []", "0.0018 []"], [], []),
-        (both, both, 7_501, ["0.1 []"], ["0.0018 []"], []),
-        ((), (), math.inf, [], [], last),
+    begin, both = ["probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
+    shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
+    again = ["0.015 False", "0.004 False"] * (not found)
+    for first, second, triangles, end in (
+        (both, (0.1,), math.inf, ["0.0018 ['thorough']"]),
+        (both, both, 7_500, []),
+        (both, both, 7_501, []),
+        ((), (), math.inf, ["0.0018 ['thorough']"]),
     ):
         a, b = (
             SimpleNamespace(exact=1, is_simple=True, chords=chords, quick_bodies=(1,), fine_triangles=triangles)
             for chords in (first, second)
         )
+        coarse, fine = ["0.1 []"] * bool(first), ["0.0018 []"] * (first == second == both)
+        soon, late = (fine, []) if deep <= 1e-4 and triangles == 7_500 else ([], fine)
         order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
-        assert order == [*quick, "distance", "probe", "0.04 True 5", "forms", *fine, *["0.04 False 5"] * (not found),
-                         "0.015 False 5", "0.004 False 5", *end]  # fmt: skip
+        assert order == [*coarse, *begin, *soon, *shares, "forms", *late, *again, *end]
         a.quick_bodies = None
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
 
@@ -120,9 +124,9 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
-    assert [answer.method for answer in answers[:4]] == ["distance", "probe", "0.04", "0.04"]
-    assert len(answers) == 5
-    assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[4:])
+    assert [answer.method for answer in answers[:4]] == ["probe", "0.04", "0.015", "without fine meshes"]
+    assert len(answers) == 4
+    assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 
 
 def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
