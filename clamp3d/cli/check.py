@@ -65,7 +65,7 @@ class Check(Source, Quiet):
         metavar="FIT|A:B[=MM]",
     )
     clearance: float | None = option("Gap that parts must keep; replaces the file's.", metavar="MM")
-    distances: bool = option("Measure every pair, not only as finely as its verdict needs.")
+    distances: bool = option("Measure every pair, not only as finely as its verdict needs, and depths with more work.")
     baseline: Path | None = option(
         "Compare with this result of an earlier check --json; then only new findings count for the exit code.",
         type=INPUT_FILE,

@@ -54,7 +54,8 @@ def check(
     pairs : sequence of (str, str), optional
         Names of the pairs to look at; all by default.
     distances : bool
-        Measure every pair to `clamp3d.engine.refine.ACCURACY`, not only until its verdict is certain.
+        Measure every pair to `clamp3d.engine.refine.ACCURACY`, not only until its verdict is certain, and spend more
+        work on the depths and volumes of clashes.
     depths : bool
         Measure the penetration depth of clashes, as `clamp3d.engine.distance.distance` does; without, "at least".
     progress : callable, optional
@@ -217,7 +218,7 @@ class _Questions:
                 self._answers[key] = self._answer(a, b, T, start, allowance)
             verdict, distance = self._answers[key]
             if depth and (*key, depth) not in self._answers:
-                self._answers[*key, depth] = verdict, penetration(a, b, T, distance)
+                self._answers[*key, depth] = verdict, penetration(a, b, T, distance, thorough=self.distances)
         except MissingLibraryError:
             raise
         except Exception as error:  # one pair that fails is a finding, not the end of all others
@@ -226,7 +227,7 @@ class _Questions:
             distance = self._answers[*key, depth][1] if depth else distance.of_overlap()
         row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
         if verdict in BAD:
-            return replace(row, locator=Locator(a, b, first.T_world, T))
+            return replace(row, locator=Locator(a, b, first.T_world, T, self.distances))
         if verdict is Verdict.UNCERTAIN:
             models = {first.name: a, second.name: b}
             return replace(row, reason=undecided(models, distance, self.scene.thresholds, allowance))

@@ -41,8 +41,6 @@ its hole says nothing of how much it is too thick.
 """
 _SHARP = 1.1
 """Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
-_CHORD = 0.005
-"""Chord error (mm) of the finer meshes for depths of solids from CAD: half the usual contact threshold."""
 _STEADY = 10.0
 """Ratio of a way out to what meshes hide from which on finer ones shorten it by no more than a fifth."""
 _TIGHT = 1.01
@@ -80,7 +78,7 @@ def depth_of_pieces(a: Model, b: Model, T: Array) -> Distance | None:
     return distance if distance.upper <= 0.0 else None
 
 
-def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
+def penetration(a: Model, b: Model, T: Array, distance: Distance, *, thorough: bool = False) -> Distance:
     """The signed distance of two overlapping bodies with bounds of the depth in place of the interference.
 
     Parameters
@@ -89,6 +87,8 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
         The bodies, b placed by ``T`` (4, 4) in a's frame.
     distance : Distance
         What `refine` says of them; returned as it is where they are apart.
+    thorough : bool
+        Spend more work on solids from CAD: the finest meshes, and as many exact gaps as for other bodies.
 
     Returns
     -------
@@ -106,8 +106,8 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
         upper = max(exact.lower, min(exact.upper, distance.upper))
         return replace(exact, upper=upper, interference=(depth, at_most), level=distance.level)
     way = None
-    for meshes in _overlapping_meshes(a, b, T):
-        new = _way_out(a, b, meshes, depth)
+    for meshes in _overlapping_meshes(a, b, T, thorough):
+        new = _way_out(a, b, meshes, depth, thorough)
         way = new if way is None or new.lower > way.lower else way
         depth, is_long = -new.upper, _is_long(way, meshes)
         if -way.lower <= _TIGHT * depth or -way.lower >= _STEADY * meshes.hidden:
@@ -116,7 +116,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance) -> Distance:
         return replace(distance, lower=-np.inf, interference=(depth, at_most))
     method = distance.method
     if is_long:
-        own = _interference(a, b, meshes)
+        own = _interference(a, b, meshes, thorough)
         depth, at_most, method = max(depth, -own.upper), min(at_most, -own.lower), own.method or method
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     return replace(
@@ -142,31 +142,43 @@ class _OverlappingMeshes(NamedTuple):
     hidden: float
 
 
-def _overlapping_meshes(a: Model, b: Model, T: Array) -> Iterator[_OverlappingMeshes]:
+def _overlapping_meshes(a: Model, b: Model, T: Array, thorough: bool) -> Iterator[_OverlappingMeshes]:
     """Meshes of two bodies that overlap, coarse ones of solids from CAD first; none where they are apart."""
     if not (a.chords and b.chords):
         return
-    both_exact = a.exact is not None and b.exact is not None
-    for chord_of in (_coarse_chord, _fine_chord) if both_exact else (_fine_chord,):
-        outer_a, outer_b = a.outer(chord_of(a)), b.outer(chord_of(b))
+    for chord_a, chord_b in _chords(a, b, thorough):
+        try:
+            outer_a, outer_b = a.outer(chord_a), b.outer(chord_b)
+        except Clamp3dError:  # the finest ones may take too long to make
+            return
         shared = common(outer_a, outer_b, T)
-        hidden = outer_a.error + outer_b.error + sum(chord_of(model) for model in (a, b) if model.bracketed)
+        hidden = outer_a.error + outer_b.error + chord_a * a.bracketed + chord_b * b.bracketed
         if shared is not None:
             yield _OverlappingMeshes(outer_a, outer_b, T, shared, hidden)
         if hidden <= _EXACT:  # finer ones are the same
             return
 
 
-def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float) -> Distance:
+def _chords(a: Model, b: Model, thorough: bool) -> Iterator[tuple[float, float]]:
+    """Chord errors (mm) of the meshes of two bodies, from coarse to fine."""
+    both_exact = a.exact is not None and b.exact is not None
+    if both_exact:
+        yield a.chords[0], b.chords[0]
+    yield a.fine_chord, b.fine_chord
+    if both_exact and thorough:
+        yield a.chords[-1], b.chords[-1]
+
+
+def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, thorough: bool) -> Distance:
     """Minus the length of a translation along ``normal`` that parts two bodies, and minus a depth that a point has."""
     depth = max(depth, _reached(a, b, meshes))
     length, direction = _way_by_meshes(meshes, depth)
     way = Distance(-length, -depth, normal=direction, method="meshes (FCL)")
-    both_exact = a.exact is not None and b.exact is not None
-    for _ in range(_EXACT_ADVANCES if both_exact else _ADVANCES):
+    is_costly = a.exact is not None and b.exact is not None and not thorough
+    for _ in range(_EXACT_ADVANCES if is_costly else _ADVANCES):
         if _is_long(way, meshes) or -way.lower <= _TIGHT * -way.upper:
             break
-        shorter = _shortened(a, b, meshes.T, -way.lower * direction)
+        shorter = _shortened(a, b, meshes.T, -way.lower * direction, _EDGE_PAIRS if is_costly else np.inf)
         upper = min(shorter.upper, way.upper)
         # If it is shorter than a point is deep, some of the gap was overlooked.
         if shorter.lower <= way.lower or upper < shorter.lower - 2.0 * TOLERANCE:
@@ -189,18 +201,19 @@ def _reached(a: Model, b: Model, meshes: _OverlappingMeshes) -> float:
     return 0.0 if shared is None else deepest(inner_a, inner_b, meshes.T, shared)[0]
 
 
-def _shortened(a: Model, b: Model, T: Array, way: Array) -> Distance:
+def _shortened(a: Model, b: Model, T: Array, way: Array, most: float) -> Distance:
     """Bounds of minus the depth: ``lower`` by a translation that parts the bodies, along ``normal``.
 
-    ``way`` (3,) parts them too. Lemma: bodies that keep a gap after a translation are also apart after one that is
-    shorter by as much, since no point moves by more. The points that are nearest after it are about as deep before.
+    ``way`` (3,) parts them too. ``most``: pairs of edges that Open CASCADE may look at.
+    Lemma: bodies that keep a gap after a translation are also apart after one that is shorter by as much, since no
+    point moves by more. The points that are nearest after it are about as deep before.
     """
     moved = T.copy()
     moved[:3, 3] += way
     length = float(np.linalg.norm(way))
     if a.exact is not None and b.exact is not None:
         try:
-            gap = exact_distance(a, b, moved, most=_EDGE_PAIRS)
+            gap = exact_distance(a, b, moved, most)
         except Clamp3dError:
             return Distance()
     else:
@@ -218,35 +231,20 @@ def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:
     return -way.lower > LONG * (meshes.hidden - way.upper)
 
 
-def _interference(a: Model, b: Model, meshes: _OverlappingMeshes) -> Distance:
+def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, thorough: bool) -> Distance:
     """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the finest meshes."""
     own = Distance()
     if a.exact is not None and b.exact is not None:
         own = exact_overlap(a, b, meshes.T, SHARES[1])
         if np.isfinite(own.lower):
             return own
-        *_, meshes = _overlapping_meshes(a, b, meshes.T)
+        *_, meshes = _overlapping_meshes(a, b, meshes.T, thorough)
     most = thickness(meshes.a, meshes.b, meshes.T, meshes.shared, _is_sharp, FEW_CUTS)
     return replace(own, lower=-meshes.hidden - most, method="")
 
 
 def _is_sharp(bound: float, reached: float) -> bool:
     return bound <= _SHARP * reached
-
-
-def _coarse_chord(model: Model) -> float:
-    return model.chords[0]
-
-
-def _fine_chord(model: Model) -> float:
-    """Chord error (mm) of the mesh that a depth is measured on: the coarse one where finer ones take too long."""
-    finest = model.chords[min(1, len(model.chords) - 1)]
-    finest = finest if model.exact is None else max(finest, _CHORD)
-    try:
-        model.outer(finest)
-    except Clamp3dError:
-        return _coarse_chord(model)
-    return finest
 
 
 def _way_by_meshes(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Array]:

@@ -46,6 +46,10 @@ _MOST_FINE = 80_000
 """Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
+_FINE_CHORD = 0.005
+"""Chord error (mm) of the finer meshes for depths of solids from CAD: half the usual contact threshold."""
+QUICK_TRIANGLES = 15_000
+"""Triangles of the fine meshes of a pair up to which Open CASCADE's answer takes longer than these."""
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 """Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
@@ -117,6 +121,11 @@ class Model:
     def chords(self) -> tuple[float, ...]:
         """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
         raise NotImplementedError
+
+    @property
+    def fine_chord(self) -> float:
+        """Chord error (mm) of the mesh that depths are measured on."""
+        return self.chords[min(1, len(self.chords) - 1)]
 
     @cached_property
     def bodies(self) -> Forms | None:
@@ -248,6 +257,16 @@ class CadModel(Model):
         if not is_closed(coarse.faces):
             return ()
         return CAD_CHORDS if self.fine_triangles <= _MOST_FINE else CAD_CHORDS[:1]
+
+    @cached_property
+    def fine_chord(self) -> float:
+        """Chord error (mm) of the mesh that depths are measured on: the coarse one where finer ones take too long."""
+        finest = max(self.chords[-1], _FINE_CHORD)
+        try:
+            self.outer(finest)
+        except Clamp3dError:
+            return self.chords[0]
+        return finest
 
     @cached_property
     def fine_triangles(self) -> float:

@@ -16,7 +16,7 @@ from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
 from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
-from clamp3d.engine.model import CAD_CHORDS, Forms, Model
+from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import Clamp3dError, SolverError
 from clamp3d.files.open_cascade import TOLERANCE
@@ -28,8 +28,6 @@ ACCURACY = 1e-7
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
 
-_QUICKLY = 15_000
-"""Triangles of two fine meshes up to which they are made before Open CASCADE is asked, which takes as long then."""
 _COINCIDENT = 1e-4
 """Overlap (mm) beyond which there is a common part to ask for; up to it faces coincide, which meshes prove."""
 
@@ -93,7 +91,7 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     if not probe.upper < 0.0:  # else they overlap
         yield "exact", exact_distance(a, b, T)
     attested, finer = -probe.upper, chords[1:]
-    if attested <= _COINCIDENT and finer and a.fine_triangles + b.fine_triangles <= _QUICKLY:
+    if attested <= _COINCIDENT and finer and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES:
         while finer:
             yield "meshes", _by_meshes(a, b, T, finer.pop(0), enough)
     is_found = False

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.engine.model import MeshModel, Model, box_corners
+from clamp3d.engine.model import QUICK_TRIANGLES, MeshModel, Model, box_corners
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array, to_target
@@ -62,12 +62,16 @@ class Overlap:
 
 @dataclass(eq=False)
 class Locator:
-    """Two overlapping parts: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world."""
+    """Two overlapping parts: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world.
+
+    ``thorough``: large solids from CAD get the finest meshes where Open CASCADE finds no volume, not those of depths.
+    """
 
     a: Model
     b: Model
     T_a: Array
     T_ab: Array
+    thorough: bool = False
 
     @cached_property
     def overlap(self) -> Overlap | None:
@@ -85,9 +89,15 @@ class Locator:
 
     def _overlaps(self) -> Iterator[Overlap | None]:
         """Where they overlap by coarse meshes, by Open CASCADE for two solids from CAD, and by finer meshes."""
-        chords = sorted({*self.a.chords, *self.b.chords}, reverse=True) if self.a.chords and self.b.chords else []
-        if chords:
-            yield self._at(chords[0])
+        models = (self.a, self.b)
+        if not all(model.chords for model in models):
+            yield self._exact()
+            return
+        solids = [] if self.thorough else [model for model in models if model.exact is not None]
+        is_large = sum(solid.fine_triangles for solid in solids) > QUICK_TRIANGLES
+        finest = max(solid.fine_chord for solid in solids) if is_large else 0.0
+        chords = sorted({max(chord, finest) for model in models for chord in model.chords}, reverse=True)
+        yield self._at(chords[0])
         yield self._exact()
         for chord in chords[1:]:
             with suppress(Clamp3dError):  # of solids from CAD fine ones may take too long to make

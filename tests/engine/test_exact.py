@@ -62,6 +62,8 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     if not found:
         monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
     low, high = Locator(a, b, np.eye(4), np.eye(4)).overlap.volume
+    assert low <= volume <= high < 3.0 * low
+    low, high = Locator(a, b, np.eye(4), np.eye(4), thorough=True).overlap.volume
     assert low <= volume <= high < 2.0 * low
     distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.02))
     least, most = distance.interference
@@ -69,6 +71,18 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert -distance.lower > 0.5
     assert ("CASCADE" in distance.method) is found
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
+
+
+@pytest.mark.parametrize("family", ["cones_side_by_side", "ball_in_cone", "ball_in_ring"])
+def test_where_every_distance_is_measured_depths_of_oblique_contacts_are_tighter(family):
+    pair = placed_pair(family, np.random.default_rng(3), -0.04, splines=0.0)
+    scene = Scene()
+    for name, solid in (("a", pair.a), ("b", pair.b)):
+        scene = scene.add(name, BrepSolid.of(first_solid(solid), name))
+    (usual,), (thorough,) = (check(scene, distances=measured).pairs for measured in (False, True))
+    loose, tight = usual.distance, thorough.distance
+    assert loose.lower - 1e-6 <= tight.lower <= -0.04 <= tight.upper <= loose.upper + 1e-6
+    assert tight.upper - tight.lower < 0.9 * (loose.upper - loose.lower)
 
 
 def test_a_shared_volume_holds_where_open_cascade_integrates_badly():
