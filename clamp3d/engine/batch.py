@@ -9,7 +9,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distances
 from clamp3d.engine.closed_form import Bore, ClosedForm
-from clamp3d.engine.convex import Convex, Rod
+from clamp3d.engine.convex import Ball, Convex, Rod
 from clamp3d.engine.hull import MEMBER
 from clamp3d.engine.model import Model
 from clamp3d.geometry.pose import Array, inverse, to_target
@@ -78,12 +78,15 @@ def _attested(form: ClosedForm, other: ClosedForm, T: Array) -> Array:
 
 
 def _points_in(piece: Convex) -> Array:
-    """Points (k, 3) in a piece: in the middle, and just under the side, the ends or the corners."""
+    """Points (k, 3) in a piece: in the middle, and just under the surface, the ends or the corners."""
     if isinstance(piece, Rod):
         z, angle, share = (x.ravel() for x in np.meshgrid(*_IN_A_ROD))
         around = np.column_stack([share * np.cos(angle), share * np.sin(angle), z])
         axis = np.column_stack([np.zeros((len(_IN_A_ROD[0]), 2)), _IN_A_ROD[0]])
         return to_target(piece.T, np.vstack([axis, around]) * (piece.radius, piece.radius, piece.length))
+    if isinstance(piece, Ball):
+        axes = piece.radius * np.vstack([np.eye(3), -np.eye(3)])
+        return piece.T[:3, 3] + np.vstack([np.zeros(3), *(share * axes for share in _SHARES)])
     corners = piece.vertices[:: 1 + len(piece.vertices) // _CORNERS]
     middle = piece.vertices.mean(axis=0)
     return np.vstack([middle, *(middle + share * (corners - middle) for share in _SHARES)])

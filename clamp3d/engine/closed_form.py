@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.convex import Convex, Rod, convex_distance
+from clamp3d.engine.convex import Ball, Convex, Rod, convex_distance
 from clamp3d.engine.hull import MEMBER
 from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
@@ -24,6 +24,8 @@ from clamp3d.kernel.distance import SignedDistance, signed_distance
 
 _ROUNDING = 1e-13
 """Relative to a bore's radius and place: points this deep in it still count as on its surface."""
+_POINT = 1e-12
+"""Length of a capsule that stands for a ball in the kernel, relative to its radius."""
 _TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -100,7 +102,7 @@ def bodies_distance(a: ClosedForm, b: ClosedForm, T: Array, enough: Callable[[Di
 def _answers(a: ClosedForm, b: ClosedForm, T: Array) -> Iterator[Distance]:
     """Bounds of the distance of two bodies from each pair of their pieces."""
     for first, second, place, swapped in ((a, b, T, False), (b, a, inverse(T), True)):
-        rods = [piece for piece in second.outers if isinstance(piece, Rod)] if second.surface is None else []
+        rods = [piece for piece in second.outers if isinstance(piece, (Rod, Ball))] if second.surface is None else []
         for bore, rod in itertools.product(first.bores, rods):
             new = _with_witnesses(bore_rod(bore, rod, place), (None, rod), first, second, place)
             yield new.moved(T).swapped() if swapped else new
@@ -115,19 +117,22 @@ def kernel_distance(answer: SignedDistance) -> Distance:
     return Distance(d - e, d + e, p, q, answer.normal, None, "features", "groove kernel")
 
 
-def bore_rod(bore: Bore, rod: Rod, T: Array) -> Distance:
-    """The kernel's answer for a bore of the first body and a rod of the second, placed by ``T``.
+def bore_rod(bore: Bore, rod: Rod | Ball, T: Array) -> Distance:
+    """The kernel's answer for a bore of the first body and a rod or ball of the second, placed by ``T``.
 
     In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
     covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
     tilt = norm(cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
-    flat = [(signed_distance(groove, Cylinder(rod.radius, rod.length), P), place) for groove, place, P in covers]
-    answer, place = min(flat, key=lambda cover: cover[0].distance)
-    distance = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 else None)
+    is_ball = isinstance(rod, Ball)
+    capsule = Capsule(rod.radius, _POINT * rod.radius if isinstance(rod, Ball) else rod.length)
+    with_ends = capsule if isinstance(rod, Ball) else Cylinder(rod.radius, rod.length)
+    own = [(signed_distance(groove, with_ends, P), place) for groove, place, P in covers]
+    answer, place = min(own, key=lambda cover: cover[0].distance)
+    distance = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 and not is_ball else None)
     if answer.distance > answer.error_bound:
         return distance
-    answers = [signed_distance(groove, Capsule(rod.radius, rod.length), P) for groove, _, P in covers]
+    answers = [signed_distance(groove, capsule, P) for groove, _, P in covers]
     if len(answers) > 1 and any(answer.distance <= answer.error_bound - rod.radius for answer in answers):
         return Distance()  # in the material the two halves' depths end where they meet, that of the whole does not
     return replace(distance, lower=min(answer.distance - answer.error_bound for answer in answers))

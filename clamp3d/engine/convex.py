@@ -89,7 +89,41 @@ class Rod:
         return np.asarray(self.T[:3, 3] + np.outer([-0.5 * self.length, 0.5 * self.length], self.T[:3, 2]))
 
 
-Convex: TypeAlias = Rod | Hull
+@dataclass(frozen=True, slots=True, eq=False)
+class Ball:
+    """A ball about the origin of its pose ``T`` (4, 4) in the part's frame; mm."""
+
+    radius: float
+    T: Array
+
+    def support(self, n: Array) -> Array:
+        """The points (k, 3) that lie furthest along ``n`` (k, 3)."""
+        return np.asarray(self.T[:3, 3] + self.radius * n / np.linalg.norm(n, axis=1)[:, None])
+
+    def face(self, n: Array, within: float = FLAT) -> Array:
+        """The point (1, 3) that lies furthest along ``n`` (3,)."""
+        return self.support(n[None])
+
+    def depth(self, points: Array) -> Array:
+        """How deep points (k, 3) lie inside; negative outside."""
+        return np.asarray(self.radius - np.linalg.norm(points - self.T[:3, 3], axis=1))
+
+    @property
+    def flat_normals(self) -> Array:
+        """None (0, 3): it is flat nowhere."""
+        return np.empty((0, 3))
+
+    def normals(self, n: Array) -> Array:
+        """None (0, 3) besides the directions ``n`` (k, 3) themselves."""
+        return np.empty((0, 3))
+
+    @property
+    def ends(self) -> Array:
+        """The centre (2, 3), twice: it is a cylinder with round ends whose axis has no length."""
+        return np.tile(self.T[:3, 3], (2, 1))
+
+
+Convex: TypeAlias = Rod | Ball | Hull
 
 
 def convex_distance(a: Convex, Ta: Array, b: Convex, Tb: Array, *, sharp: bool = True) -> Distance:
@@ -200,6 +234,8 @@ def _geometry(piece: Convex) -> tuple[Any, Array]:
 
     if isinstance(piece, Rod):
         return fcl.Cylinder(_ENLARGED * piece.radius, _ENLARGED * piece.length), piece.T
+    if isinstance(piece, Ball):
+        return fcl.Sphere(_ENLARGED * piece.radius), piece.T
     flat = np.column_stack([np.full(len(piece.faces), 3), piece.faces]).ravel()
     return fcl.Convex(_ENLARGED * piece.vertices, len(piece.faces), flat), np.eye(4)
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.engine.closed_form import ClosedForm
-from clamp3d.engine.convex import Rod
+from clamp3d.engine.convex import Ball, Rod
 from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.engine.near_faces import FaceMeshes
@@ -27,7 +27,7 @@ from clamp3d.files.solid import CHORD, BrepSolid
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array, to_target
-from clamp3d.geometry.shapes import MeshShape, Shape, Solid, cylinder
+from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere, cylinder
 
 if TYPE_CHECKING:
     from clamp3d.fit.features import FitResult
@@ -399,10 +399,33 @@ class MeshModel(Model):
         return Surface(V, F, at_edges(V, F, error, patch) if patch.any() else error, self.is_simple)
 
 
+class SphereModel(MeshModel):
+    """A ball, and facets with their corners on it."""
+
+    shape: Sphere
+
+    @property
+    def is_simple(self) -> bool:
+        """It is: nobody has to look for triangles that cross each other."""
+        return True
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of the ball's box, mm."""
+        return np.outer([-self.shape.radius, self.shape.radius], np.ones(3))
+
+    @cached_property
+    def bodies(self) -> Forms | None:
+        """The ball itself."""
+        return (ClosedForm((Ball(self.shape.radius, np.eye(4)),)),)
+
+
 def model_of(shape: Shape, counters: Counters) -> Model:
     """The model of a shape, by its kind."""
     if isinstance(shape, Solid):
         return DrawnModel(shape, counters)
+    if isinstance(shape, Sphere):
+        return SphereModel(shape, counters)
     return CadModel(shape, counters) if isinstance(shape, BrepSolid) else MeshModel(shape, counters)
 
 

@@ -1,7 +1,8 @@
 """Lower bounds that hold for a whole stretch of a motion: one part still, the other's pieces swept.
 
 A cylinder is swept into a longer and thicker one: sliding along its own axis costs nothing, so a pin in its bore
-keeps its clearance over any stretch. A polyhedron is swept into the hull of its first and last position.
+keeps its clearance over any stretch. A ball is swept into a larger one, a polyhedron into the hull of its first and
+last position.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.closed_form import ClosedForm, bore_rod
-from clamp3d.engine.convex import Convex, Rod, convex_distance
+from clamp3d.engine.convex import Ball, Convex, Rod, convex_distance
 from clamp3d.engine.hull import Hull, hull
 from clamp3d.engine.model import Model
 from clamp3d.geometry.pose import Array, inverse, to_target
@@ -46,15 +47,24 @@ def swept_lower(
 def _bounds(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> Iterator[float]:
     """Lower bounds of the distance from each bore and piece of ``still`` and each swept piece of ``moving``."""
     for piece in moving.outers:
-        if isinstance(piece, Rod):
-            rod = _swept_rod(piece, poses, angle)
-            yield from (bore_rod(bore, rod, poses[1]).lower for bore in still.bores)
-            swept: Convex = rod
-            place, sag = poses[1], 0.0
-        else:
-            (swept, sag), place = _swept_hull(piece, poses, angle), np.eye(4)
+        swept, place, sag = _swept(piece, poses, angle)
+        if not isinstance(swept, Hull):
+            yield from (bore_rod(bore, swept, place).lower for bore in still.bores)
         for other in still.outers:
             yield convex_distance(other, np.eye(4), swept, place, sharp=False).lower - sag
+
+
+def _swept(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Convex, Array, float]:
+    """What holds a piece all the time, at a pose (4, 4), and how far (mm) it leaves that."""
+    match piece:
+        case Rod():
+            return _swept_rod(piece, poses, angle), poses[1], 0.0
+        case Ball():
+            ways = np.array([to_target(T, piece.ends) for T in poses])
+            reach = float(np.linalg.norm(ways - ways[1], axis=2).max()) + _sagitta(ways, angle)
+            return Ball(piece.radius + reach, piece.T), poses[1], 0.0
+    swept, sag = _swept_hull(piece, poses, angle)
+    return swept, np.eye(4), sag
 
 
 def _swept_hull(piece: Hull, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:

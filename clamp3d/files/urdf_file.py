@@ -16,7 +16,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-import trimesh
 
 from clamp3d import checks
 from clamp3d.errors import InputError, missing
@@ -24,9 +23,9 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import FORMATS, read
 from clamp3d.files.placing import Placer
 from clamp3d.files.worker import OUTSIDE, may_read
-from clamp3d.geometry.mesh import Array, IntArray, make_mesh
+from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import nearest_rigid
-from clamp3d.geometry.shapes import MeshShape, Shape, box, cylinder
+from clamp3d.geometry.shapes import Shape, box, cylinder, sphere
 
 try:
     import networkx  # which yourdfpy needs
@@ -86,18 +85,15 @@ def _triangles(robot: Path, file: str, notes: list[str]) -> tuple[Array, IntArra
 
 
 def _drawn(geometry: Any) -> Shape | str:
-    """A box, a cylinder, or a sphere as facets, in mm; or which size of it is not > 0."""
+    """A box, a cylinder or a sphere, in mm; or which size of it is not > 0."""
     try:
         if geometry.box is not None:
             return box(tuple(1000.0 * float(x) for x in geometry.box.size))
         if geometry.cylinder is not None:
             return cylinder(1000.0 * geometry.cylinder.radius, 1000.0 * geometry.cylinder.length)
-        radius = checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius)
+        return sphere(checks.positive("radius of a sphere", 1000.0 * geometry.sphere.radius))
     except InputError as error:
         return str(error)
-    facets = trimesh.creation.icosphere(4, radius)
-    nearest = float(np.abs(np.einsum("ij,ij->i", facets.triangles[:, 0], facets.face_normals)).min())
-    return MeshShape(make_mesh(facets.vertices, facets.faces, name="sphere"), "off", "sphere", radius - nearest)
 
 
 def _mesh_file(path: Path, name: str) -> Path:

@@ -111,6 +111,13 @@ class MeshShape:
             raise InputError(f"error of a mesh must be >= 0 and < {FARTHEST_OFF:g} mm, got {self.error}")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sphere(MeshShape):
+    """A ball about the origin of ``radius`` mm, with facets whose corners lie on it for whoever needs them."""
+
+    radius: float = field(kw_only=True)
+
+
 Shape: TypeAlias = Solid | MeshShape
 AnyShape: TypeAlias = Shape | Mesh | Cylinder | Capsule | SweptArc
 
@@ -239,8 +246,8 @@ FINEST_SPHERE = 1e-5
 """Least error of a sphere's facets relative to its radius: a third of a million of them."""
 
 
-def sphere(radius: float, *, mesh_error: float | None = None, name: str = "sphere") -> MeshShape:
-    """Sphere about the origin as a mesh whose ``error`` says how far its facets lie below the true surface.
+def sphere(radius: float, *, mesh_error: float | None = None, name: str = "sphere") -> Sphere:
+    """Sphere about the origin: distances are those of the true ball, its facets serve for volumes, pages and files.
 
     Parameters
     ----------
@@ -253,8 +260,8 @@ def sphere(radius: float, *, mesh_error: float | None = None, name: str = "spher
 
     Returns
     -------
-    MeshShape
-        The mesh, with its corners on the sphere; distances from it are intervals that hold for the sphere.
+    Sphere
+        The ball, with a ``mesh`` that has its corners on it and lies below it by its ``error`` at most.
 
     Raises
     ------
@@ -278,7 +285,8 @@ def sphere(radius: float, *, mesh_error: float | None = None, name: str = "spher
         if gap * radius <= limit:
             break
     rounding = 1e-12 * radius
-    return MeshShape(make_mesh(radius * ball.vertices, ball.faces, name=name), name=name, error=gap * radius + rounding)
+    mesh = Mesh(name, radius * ball.vertices, ball.faces, True, rounding)
+    return Sphere(mesh, name=name, error=gap * radius + rounding, radius=radius)
 
 
 def groove_block(
