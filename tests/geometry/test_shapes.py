@@ -36,18 +36,12 @@ def test_an_extrusion_is_its_polygon_times_its_height(outline):
 
 
 @pytest.mark.parametrize("mesh_error", [None, 0.5])
-def test_distances_of_a_sphere_hold_for_the_true_one(mesh_error):
+def test_the_facets_of_a_sphere_have_their_corners_on_it(mesh_error):
     ball = sphere(5.0, mesh_error=mesh_error)
     assert 0.0 < ball.error <= (mesh_error or 5e-3)
     assert np.linalg.norm(ball.mesh.vertices, axis=1) == pytest.approx(5.0, abs=1e-12)
     centres = ball.mesh.vertices[ball.mesh.faces].mean(axis=1)
     assert 5.0 - np.linalg.norm(centres, axis=1).min() <= ball.error
-    for turn in (0.0, 0.3, 1.1):
-        T = rotation((1.0, 2.0, 0.0), turn)
-        T[:3, 3] = T[:3, :3] @ (0.0, 0.0, 7.0)  # the ball sees the box's face from its middle
-        found = distance(ball, box(2, 2, 2), T)
-        assert found.lower <= 1.0 <= found.upper
-        assert found.upper - found.lower <= 3.0 * ball.error
 
 
 test_what_is_no_shape_is_refused = refusals(
