@@ -6,6 +6,7 @@ are one group. Text, JSON, page, report and CSV list these groups.
 
 from __future__ import annotations
 
+import base64
 import getpass
 import hashlib
 import json
@@ -133,9 +134,11 @@ def _alike(rows: Sequence[PairResult]) -> list[list[PairResult]]:
 def _group(scene: Scene, rows: Sequence[PairResult], family: Mapping[str, str]) -> Group:
     row = rows[0]
     a, b = (family[row.a], family[row.b]) if len(rows) > 1 else (row.a, row.b)
-    identifier = hashlib.blake2s("\n".join(sorted(_signature(scene, row) for row in rows)).encode(), digest_size=4)
+    cause = "\n".join(sorted(_signature(scene, row) for row in rows))
+    # Letters and 2 to 7: of digits and "e" a spreadsheet makes numbers.
+    identifier = base64.b32encode(hashlib.blake2s(cause.encode(), digest_size=5).digest()).decode().lower()
     lower, upper = min(row.distance.lower for row in rows), max(row.distance.upper for row in rows)
-    return Group(identifier.hexdigest(), a, b, tuple(rows), lower, upper)
+    return Group(identifier, a, b, tuple(rows), lower, upper)
 
 
 def _signature(scene: Scene, row: PairResult) -> str:
@@ -211,8 +214,10 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
         raise InputError(f"the reason (--why) must not be empty, got {why!r}")
     present = read_accepted(path)
     for identifier in identifiers:
-        if not re.fullmatch(r"[0-9a-f]{8}", identifier):
-            raise InputError(f"id of a finding must be 8 digits 0-9a-f, as `check` prints it, got {identifier!r}")
+        if not re.fullmatch(r"[0-9a-z]{8}", identifier):
+            raise InputError(
+                f"id of a finding must be 8 digits and letters a-z, as `check` prints it, got {identifier!r}"
+            )
     new = [i for i in dict.fromkeys(identifiers) if i not in present]
     entries = [Accepted(i, who or getpass.getuser(), date.today().isoformat(), why) for i in new]
     text = path.read_text(encoding="utf-8") if path.is_file() else ""

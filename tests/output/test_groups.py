@@ -160,6 +160,9 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert {(line["a"], line["b"], line["status"]) for line in lines} == {("a", "b", "same"), ("b", "c", "new")}
     assert all(float(line["at_least_mm"]) <= float(line["at_most_mm"]) for line in lines if line["at_least_mm"])
     ids = sorted(line["id"] for line in lines)
+    assert all(
+        re.fullmatch("[a-z2-7]{8}", item) for item in ids
+    )  # a spreadsheet makes numbers of 12345678 and 1234e567
     code, out, _ = main("accept", "boxes.toml", *ids, "--why", 'a "press" fit', "--who", "Ada")
     assert (code, out) == (0, "boxes.accepted.toml: 2 accepted\n")
     out = main("accept", "boxes.toml", ids[0], "--why", "again")[1]
@@ -180,7 +183,7 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
         (("check", "boxes.toml", "--baseline", "none.json"), {}, "none.json: cannot be read: No such file"),
         (("check", "boxes.toml", "--baseline", "old.json"), {"old.json": "{}"}, "not a result of `clamp3d check --"),
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
-        (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 digits 0-9a-f"),
+        (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 digits and letters a-z"),
         (("accept", "boxes.toml", "00000000"), {}, "Missing option '--why'"),
         (("accept", "boxes.toml", "00000000", "--why", " "), {}, "the reason (--why) must not be empty, got ' '"),
     ],
