@@ -26,7 +26,10 @@ _OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "Memory allocation")
 """What a process prints that ends for want of memory: C++, Python, OpenBLAS."""
 _CPU_SIGNAL = getattr(signal, "SIGPROF", 0)
 """What ends a process that has used its processor time; Windows has none."""
-_FORBIDDEN = ("socket.connect", "socket.getaddrinfo", "socket.bind", "subprocess.", "os.system", "os.exec", "os.fork")
+_FORBIDDEN = (
+    *("socket.connect", "socket.getaddrinfo", "socket.bind", "socket.sendto", "socket.sendmsg"),
+    *("subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.spawn"),
+)
 
 
 class WorkerEndedError(Clamp3dError):

@@ -40,8 +40,9 @@ def read_triangles(path: Path, unit: str | None) -> Reading:
 def _arrays(path: Path) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3), in the file's unit."""
     raw, kind = path.read_bytes(), path.suffix[1:].lower()
-    if kind == "obj":  # trimesh passes over lines that begin with blanks
+    if kind == "obj":  # trimesh passes over lines that begin with blanks, and faces with a comment after them
         raw = re.sub(rb"(?m)^[ \t]+", b"", re.sub(rb"\\\r?\n", b" ", raw))
+        raw = re.sub(rb"(?m)^([vf][^\r\n#]*)#[^\r\n]*", rb"\1", raw)
     announced = _ANNOUNCED[kind](raw)
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`

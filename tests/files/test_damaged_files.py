@@ -33,10 +33,10 @@ OFF = b"OFF\n4 1 0\n" + CORNERS
 NOTCHED_PLY = PLY[: PLY.index(b"0 0 0")].replace(b"vertex 3", b"vertex 4").replace(b"face 2", b"face 1") + CORNERS
 NOTCHED_OBJ = b"".join(b"v " + line + b"\n" for line in CORNERS.splitlines()) + b"f 1 2 3 4\n"
 WEDGE = (
-    b"v 0 0 0\nv 10 0 0\nv 10 1 0\nv 0 0 5\nv 10 0 5\nv 10 1 5\n"
-    b"f 3 2 1\nf 4 5 6\n  f 1 2 5 4\nf 2 3 6\\\n 5\nf 3 1 4 6\n"
+    b"v 0 0 0 # first\nv 10 0 0\nv 10 1 0\nv 0 0 5\nv 10 0 5\nv 10 1 5\n"
+    b"f 3 2 1\nf 4 5 6\n  f 1 2 5 4\nf 2 3 6\\\n 5\nf 3 1 4 6 # last\n"
 )
-"""Of triangles and quadrangles, an indented one among them, with 6 degrees from face to face: 25 mm3."""
+"""Of triangles and quadrangles, an indented one and comments among them, with 6 degrees from face to face: 25 mm3."""
 
 
 def refused(path, message, **options):

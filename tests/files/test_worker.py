@@ -89,7 +89,13 @@ def test_memory_is_limited_for_each_call_alone(worker):
 
 
 @pytest.mark.parametrize(
-    ("function", "argument"), [("socket:create_connection", ["127.0.0.1", 9]), ("os:system", "true")]
+    ("function", "argument"),
+    [
+        ("socket:create_connection", ["127.0.0.1", 9]),
+        ("os:system", "true"),
+        ("builtins:eval", "__import__('socket').socket(2, 2).sendto(b'x', ('127.0.0.1', 9))"),
+        ("builtins:eval", "__import__('os').posix_spawn('/bin/true', ['true'], {})"),
+    ],
 )
 def test_what_it_may_not_do_is_refused(worker, function, argument):
     for confined in (worker, process()):  # the second is the one that reads foreign files
