@@ -91,20 +91,22 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     if not probe.upper < 0.0:  # else they overlap
         yield "exact", exact_distance(a, b, T)
     attested, finer = -probe.upper, chords[1:]
-    if attested <= _COINCIDENT and finer and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES:
-        while finer:
-            yield "meshes", _by_meshes(a, b, T, finer.pop(0), enough)
+    is_small = bool(finer) and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
+    if attested <= _COINCIDENT and is_small:
+        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
     is_found = False
     for overlap in _common_parts(a, b, T, attested, quick=True):
         yield "exact", overlap
         is_found = bool(np.isfinite(overlap.lower))
     if not cad_forms:
         yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
-    for chord in finer:
-        yield "meshes", _by_meshes(a, b, T, chord, enough)
+    if finer and is_small:
+        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
     if not is_found:
         for overlap in _common_parts(a, b, T, attested, quick=False):
             yield "exact", overlap
+    if finer:
+        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
     if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
         yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
 
@@ -112,11 +114,11 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
 def _common_parts(a: Model, b: Model, T: Array, attested: float, *, quick: bool) -> Iterator[Distance]:
     """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
 
-    ``quick``: the first, which makes it, within a second. ``attested``: how deep (mm) a point lies.
+    ``quick``: the first, which makes it, within a second, not in five. ``attested``: how deep (mm) a point lies.
     """
     from clamp3d.engine.exact import exact_overlap
 
-    for share in SHARES[0 if quick else 1 :]:
+    for share in SHARES:
         overlap = exact_overlap(a, b, T, share, quick=quick and share == SHARES[0], attested=attested)
         yield overlap
         if np.isinf(overlap.lower):

@@ -11,7 +11,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.boundary import Boundary, Side, vertex
-from clamp3d.files.faces import SPHERE, surfaces
+from clamp3d.files.faces import SPHERE, points_on, surfaces
 from clamp3d.files.open_cascade import (
     TOLERANCE,
     area_of,
@@ -25,7 +25,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, SAMPLED, edge_middles, points_on, triangles_of
+from clamp3d.files.tessellation import ANGLE, SAMPLED, edge_middles, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import OTHER, Surfaces, height, surfaces
+from clamp3d.files.faces import OTHER, Surfaces, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points
@@ -113,12 +113,6 @@ def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
     if face.Orientation() == occ.TopAbs_Orientation.TopAbs_REVERSED:
         triangles = triangles[:, ::-1]
     return points, triangles.reshape(-1, 3), uv
-
-
-def points_on(face: Any, uv: Array) -> Array:
-    """Points (k, 3) of a face's surface at its parameters (k, 2)."""
-    surface = occ.BRepAdaptor_Surface(face)
-    return np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
 
 
 def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntArray, uv: Array) -> Array:

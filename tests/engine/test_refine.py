@@ -91,7 +91,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
     begin, both = ["probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
-    again = ["0.015 False", "0.004 False"] * (not found)
+    again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for first, second, triangles, end in (
         (both, (0.1,), math.inf, ["0.0018 ['thorough']"]),
         (both, both, 7_500, []),
@@ -103,9 +103,10 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
             for chords in (first, second)
         )
         coarse, fine = ["0.1 []"] * bool(first), ["0.0018 []"] * (first == second == both)
-        soon, late = (fine, []) if deep <= 1e-4 and triangles == 7_500 else ([], fine)
+        place = 2 if triangles != 7_500 else 0 if deep <= 1e-4 else 1
+        soon, later, last = (fine * (k == place) for k in range(3))
         order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
-        assert order == [*coarse, *begin, *soon, *shares, "forms", *late, *again, *end]
+        assert order == [*coarse, *begin, *soon, *shares, "forms", *later, *again, *last, *end]
         a.quick_bodies = None
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
 
@@ -124,7 +125,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
-    assert [answer.method for answer in answers[:4]] == ["probe", "0.04", "0.015", "without fine meshes"]
+    assert [answer.method for answer in answers[:4]] == ["probe", "0.04", "0.04", "without fine meshes"]
     assert len(answers) == 4
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 

@@ -50,6 +50,10 @@ def test_a_surface_is_known_whether_its_file_gives_a_spline_or_not(name, splines
     brep = to_bytes(first_solid(shape.Moved(location(random_pose(np.random.default_rng(2))))))
     triangles, form = tessellate(brep, 0.05), faces.surfaces(brep)
     assert set(form.kind.tolist()) == kinds
+    for face in explore(from_bytes(brep), "FACE"):
+        surface, uv = occ.BRepAdaptor_Surface(face), np.random.default_rng(3).uniform(-1.0, 3.0, (9, 2))
+        there = [surface.Value(*place).Coord() for place in uv.tolist()]
+        assert faces.points_on(face, uv) == pytest.approx(np.array(there), abs=1e-12)
     corners = triangles.vertices[triangles.faces]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     for k in np.flatnonzero(form.kind != OTHER):
