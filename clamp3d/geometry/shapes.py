@@ -113,9 +113,18 @@ class MeshShape:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sphere(MeshShape):
-    """A ball about the origin of ``radius`` mm, with facets whose corners lie on it for whoever needs them."""
+    """A ball about the origin of ``radius`` mm, with facets whose corners lie on it for whoever needs them.
+
+    Those of one radius and one ``error`` of their facets are equal.
+    """
 
     radius: float = field(kw_only=True)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sphere) and (self.radius, self.error) == (other.radius, other.error)
+
+    def __hash__(self) -> int:
+        return hash((self.radius, self.error))
 
 
 Shape: TypeAlias = Solid | MeshShape

@@ -87,6 +87,21 @@ class BoxTable(PartTable, kw_only=True):
         return shapes.box(self.size, holes=[h.hole() for h in self.holes])
 
 
+class SphereTable(PartTable, kw_only=True):
+    """``shape = "sphere"``: about the origin."""
+
+    shape: Literal["sphere"]
+    radius: Length | None = None
+    diameter: Length | None = None
+
+    def __post_init__(self) -> None:
+        _one_of(self, "radius", "diameter")
+
+    def make(self, folder: Path) -> shapes.AnyShape:
+        """The shape."""
+        return shapes.sphere(_half(self.radius, self.diameter))
+
+
 class GrooveBlockTable(PartTable, kw_only=True):
     """``shape = "groove-block"``: in the groove's frame, arc about the origin, axis on z, mouth to +y."""
 
@@ -158,10 +173,11 @@ class MeshTable(FileTable, kw_only=True):
         return scene
 
 
-AnyTable: TypeAlias = CylinderTable | BoxTable | GrooveBlockTable | ClampPartTable | FileTable
+AnyTable: TypeAlias = CylinderTable | BoxTable | SphereTable | GrooveBlockTable | ClampPartTable | FileTable
 SHAPES: dict[str, type[AnyTable]] = {
     "cylinder": CylinderTable,
     "box": BoxTable,
+    "sphere": SphereTable,
     "groove-block": GrooveBlockTable,
     "clamp-part": ClampPartTable,
     "mesh": MeshTable,

@@ -47,6 +47,8 @@ line = { shape = "cylinder", conductor = "LJ-630", length = 80, pose.translation
 tube = { shape = "cylinder", radius = 20, bore_diameter = 32.9, length = 10, pose.translation = [0, 100, 0] }
 plate = { shape = "box", size = [30, 30, 5], holes = [{ radius = 3 }], pose.translation = [200, 0, 0] }
 cube = { shape = "mesh", file = "cube.stl", unit = "mm", fit = "off", pose.translation = [200, 0, 7.5] }
+ball = { shape = "sphere", diameter = 8, pose.translation = [200, 0, 16.6] }
+twin = { shape = "sphere", radius = 4, pose.translation = [200, 0, 16.6] }
 splint = { shape = "clamp-part", part = "P1", pose.translation = [-300, 0, 0] }
 [parts.block]
 shape = "groove-block"
@@ -74,7 +76,12 @@ def test_every_kind_of_part(tmp_path):
     assert result.verdict("block", "wire") is Verdict.CLEARANCE
     assert result.verdict("line", "tube") is Verdict.CLEARANCE  # 16.45 - 16.335
     assert result.verdict("cube", "plate") is Verdict.ALLOWED
-    assert result.counts == {"clearance": 2, "allowed": 1, "clear": 18}
+    assert result.verdict("ball", "cube") is Verdict.CLEARANCE
+    assert result.verdict("ball", "twin") is Verdict.DUPLICATE  # equal spheres are one shape
+    assert result.counts == {"duplicate": 1, "clearance": 4, "allowed": 1, "clear": 30}
+    assert next(r for r in result.pairs if {r.a, r.b} == {"cube", "ball"}).distance.value == pytest.approx(
+        0.1, abs=1e-9
+    )
     row = next(r for r in result.pairs if r.a == "line")
     assert row.distance.value == pytest.approx(32.9 / 2 - 32.67 / 2, abs=1e-6)
 
@@ -105,7 +112,7 @@ def test_motions():
     ("text", "message"),
     [
         ("[parts.wire]\nshape = ", "not valid TOML"),
-        ('[parts.a]\nshape = "cyl"\n', 'parts.a: must have shape = one of "cylinder", "box", "groove-block"'),
+        ('[parts.a]\nshape = "cyl"\n', 'parts.a: must have shape = one of "cylinder", "box", "sphere", "groove-block"'),
         (WIRE, "parts.wire.radius: give exactly one of radius, diameter, conductor"),
         (WIRE + "radius = -2\n", "parts.wire.radius: must be at least 1e-06, got -2"),
         (WIRE + 'conductor = "LJ-631"\n', "parts.wire.conductor: unknown conductor 'LJ-631'; nearest: LJ-630"),
