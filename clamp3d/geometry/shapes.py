@@ -126,6 +126,10 @@ class Sphere(MeshShape):
     def __hash__(self) -> int:
         return hash((self.radius, self.error))
 
+    def bounds_at(self, T: Array) -> Array:
+        """Lower and upper corner (2, 3) of the bounding box along the target's axes, placed by ``T`` (4, 4)."""
+        return np.array([T[:3, 3] - self.radius, T[:3, 3] + self.radius])
+
 
 Shape: TypeAlias = Solid | MeshShape
 AnyShape: TypeAlias = Shape | Mesh | Cylinder | Capsule | SweptArc

@@ -18,7 +18,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.meshing import volume_bounds
-from clamp3d.geometry.shapes import Solid
+from clamp3d.geometry.shapes import Solid, Sphere
 from clamp3d.output.placed import PlacedPart, PosedMesh
 
 
@@ -76,7 +76,7 @@ def _part(item: PlacedPart, meshed: PosedMesh | None, settings: Mapping[str, Any
             entry[key] = [round(float(bound), 6) for bound in between]
         entry["triangles"] = len(local.faces)
     else:
-        assert isinstance(shape, (Solid, BrepSolid))  # a mesh has triangles
+        assert isinstance(shape, (Solid, BrepSolid, Sphere))  # a mesh has triangles
         bounds = shape.bounds_at(item.T)
     bounds = bounds / UNITS_MM[settings["unit"]]
     if settings["up"] == "Y":  # axes X, Z, -Y

@@ -18,7 +18,7 @@ from clamp3d.files.solid import BrepSolid, require_open_cascade
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.geometry.profile import Arc
-from clamp3d.geometry.shapes import Solid
+from clamp3d.geometry.shapes import Solid, Sphere
 from clamp3d.output.placed import PlacedPart
 
 UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "INCH"}
@@ -173,4 +173,6 @@ def exact_solid(item: PlacedPart) -> Any:
         return parse(item.shape.brep)  # a new one: equal solids of two products stay two
     if isinstance(item.shape, Solid):
         return solid(item.shape)
+    if isinstance(item.shape, Sphere):
+        return occ.BRepPrimAPI_MakeSphere(item.shape.radius).Solid()
     raise InputError(f"{item.name} is a mesh: STEP holds true faces, not facets; use stl, obj, ply, glb or 3mf")

@@ -64,6 +64,16 @@ def test_step_keeps_cylinders_as_cylinders_and_planes_as_planes(reference, tmp_p
     }
 
 
+def test_a_sphere_is_a_sphere_in_step(tmp_path):
+    scene = Scene().add("ball", shapes.sphere(5.0), translation(1.0, 2.0, 3.0))
+    (file,) = export(scene, tmp_path / "ball.step").files
+    (product,) = read_step(file)
+    assert product.volume == pytest.approx(4.0 / 3.0 * np.pi * 125.0, rel=1e-9)
+    np.testing.assert_allclose(bounds(product.shape), [[-4.0, -3.0, -2.0], [6.0, 7.0, 8.0]], atol=2e-6)
+    (surface,) = (occ.BRep_Tool.Surface_s(face) for face in explore(product.shape, "FACE"))
+    assert type(surface).__name__ == "Geom_SphericalSurface"
+
+
 @pytest.mark.parametrize("suffix", ["step", "glb"])
 def test_clashes_are_bodies_of_their_own(tmp_path, suffix):
     """Two turned boxes and a pin in one of them: the common parts, calculated by hand, under the pairs' names."""
