@@ -88,8 +88,7 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         yield "meshes", _by_meshes(a, b, T, chord, enough)
     probe = exact_probe(a, b, T)
     yield "exact", probe
-    if not probe.upper < 0.0:  # else they overlap
-        yield "exact", exact_distance(a, b, T)
+    yield "exact", exact_distance(a, b, T)
     attested, finer = -probe.upper, chords[1:]
     is_small = bool(finer) and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
     if attested <= _COINCIDENT and is_small:

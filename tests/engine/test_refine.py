@@ -89,7 +89,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
     monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
     monkeypatch.setattr(exact, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    begin, both = ["probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
+    begin, both = ["probe", "distance"], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for first, second, triangles, end in (
@@ -125,8 +125,8 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
-    assert [answer.method for answer in answers[:4]] == ["probe", "0.04", "0.04", "without fine meshes"]
-    assert len(answers) == 4
+    assert [answer.method for answer in answers[:4]] == ["probe", "distance", "0.04", "0.04"]
+    assert len(answers) == 5
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 
 
