@@ -336,6 +336,14 @@ def test_that_faces_coincide_is_proven_by_meshes(family, splines):
     assert a.counters.queries["exact"] == 2 * (a.counters.queries["meshes"] > 1)  # no common part
 
 
+@pytest.mark.parametrize("family", ["ball_in_cone", "ball_in_socket"])
+def test_the_distance_of_a_ball_tells_a_small_overlap_which_no_common_part_does(family):
+    a, b = models(family, -3.6e-4)
+    verdict, distance = judge(a, b, np.eye(4), Distance(level="boxes"), Thresholds(), None)
+    assert verdict.value == "contact"
+    assert (distance.lower, distance.upper) == pytest.approx((-3.6e-4, -3.6e-4), abs=2e-6)
+
+
 @pytest.mark.parametrize("state", ["TopAbs_IN", "TopAbs_ON"])
 def test_no_depth_where_both_sides_of_an_edge_are_said_to_be_inside(state, monkeypatch):
     """Open CASCADE says so of some points beside splines; what it says of the other side shows it."""
