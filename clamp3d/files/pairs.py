@@ -169,8 +169,9 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         chord = max(chord, SAMPLED * off)
         (middle,) = points_on(face, uv[len(uv) // 2].mean(axis=0, keepdims=True))
         away = [boundary.foot(middle).distance for boundary in boundaries]
-        corners, rows = np.unique(uv.reshape(-1, 2), axis=0, return_inverse=True)  # triangles share their corners
-        points = points_on(face, corners)
+        # Triangles share their corners; pairs of numbers are sorted soonest as complex ones.
+        corners, rows = np.unique(uv.reshape(-1, 2) @ (1.0, 1.0j), return_inverse=True)
+        points = points_on(face, np.column_stack([corners.real, corners.imag]))
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append((points, rows.reshape(-1, 3)))
