@@ -105,9 +105,26 @@ def distance(
         raise Clamp3dError("the two solids have too many edges near each other")
     nearest = _nearest(first, second)
     if nearest.distance <= TOLERANCE:
-        return nearest
+        return nearest if near is not None else _confirmed(nearest, first, second)
     closer = min(_nearest(vertex(nearest.p), second).distance, _nearest(first, vertex(nearest.q)).distance)
     return nearest._replace(is_least=closer >= nearest.distance - TOLERANCE)
+
+
+def _confirmed(nearest: Nearest, first: Any, second: Any) -> Nearest:
+    """What is known of two solids that are said to touch at a point.
+
+    Open CASCADE takes some points that lie beside a solid with free-form faces for inside. Where this is one, the
+    faces' distance counts, which is the least if a point of either lies outside the other.
+    """
+    boundaries = Boundary(first), Boundary(second)
+    sides = [boundary.side(nearest.p) for boundary in boundaries]
+    if all(side is Side.INSIDE or foot.distance <= TOLERANCE for side, foot in sides):
+        return nearest
+    faces = [faces_of(shape, np.arange(sum(1 for _ in explore(shape, "FACE")))) for shape in (first, second)]
+    apart = _nearest(*faces)
+    points = (apart.q, apart.p)
+    is_outside = all(b.side(x)[0] is Side.OUTSIDE for b, x in zip(boundaries, points, strict=True))
+    return apart._replace(is_least=is_outside)
 
 
 @lru_cache(maxsize=512)

@@ -23,6 +23,7 @@ from clamp3d.engine.verdict import Thresholds
 from clamp3d.engine.where import Locator
 from clamp3d.files import cad_process, pairs
 from clamp3d.files.open_cascade import from_bytes, occ, to_bytes
+from clamp3d.files.open_cascade import moved as occ_moved
 from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
@@ -334,6 +335,25 @@ def test_that_faces_coincide_is_proven_by_meshes(family, splines):
     assert (verdict.value, distance.level) == ("contact", "meshes")
     assert -0.01 <= distance.lower <= 0.0 <= distance.upper <= 0.01
     assert a.counters.queries["exact"] == 2 * (a.counters.queries["meshes"] > 1)  # no common part
+
+
+def test_a_corner_that_is_wrongly_taken_for_inside_is_no_contact():
+    """Open CASCADE says that these two plates of splines, 0.0003 mm apart, touch: a corner is in the other, it says."""
+    rng = np.random.default_rng(56)
+    pair, T = placed_pair("plates_drilled_alike", rng, 3e-4, splines=1.0), random_pose(rng)
+    a, b = (to_bytes(first_solid(occ_moved(solid, T))) for solid in (pair.a, pair.b))
+    for first, second in ((a, b), (b, a)):
+        nearest = pairs.distance(first, second, np.eye(4))
+        assert nearest.distance == pytest.approx(3e-4, abs=1e-6)
+        assert nearest.is_least
+
+
+def test_where_one_of_two_solids_may_be_in_the_other_the_distance_of_their_faces_is_no_bound_from_below(monkeypatch):
+    inner, outer = (to_bytes(block((-x, -x, -x), (x, x, x))) for x in (1.0, 5.0))
+    assert pairs.distance(inner, outer, np.eye(4)).distance == 0.0
+    wrong = pairs.Nearest(0.0, np.array([9.0, 0.0, 0.0]), np.array([9.0, 0.0, 0.0]))
+    nearest = pairs._confirmed(wrong, from_bytes(inner), from_bytes(outer))
+    assert (nearest.distance, nearest.is_least) == (4.0, False)
 
 
 @pytest.mark.parametrize("family", ["ball_in_cone", "ball_in_socket"])
