@@ -9,7 +9,7 @@ from clamp3d.files.formats import load_mesh
 from clamp3d.geometry.mesh import Mesh, make_mesh
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
-from clamp3d.geometry.shapes import Hole, MeshShape, Solid, box, cylinder, extrusion, groove_block, sphere
+from clamp3d.geometry.shapes import Hole, MeshShape, Solid, Sphere, box, cylinder, extrusion, groove_block, sphere
 
 __all__ = [
     "Capsule",
@@ -18,6 +18,7 @@ __all__ = [
     "Mesh",
     "MeshShape",
     "Solid",
+    "Sphere",
     "SweptArc",
     "box",
     "cylinder",
