@@ -117,8 +117,7 @@ def _confirmed(nearest: Nearest, first: Any, second: Any) -> Nearest:
     faces' distance counts, which is the least if a point of either lies outside the other.
     """
     boundaries = Boundary(first), Boundary(second)
-    sides = [boundary.side(nearest.p) for boundary in boundaries]
-    if all(side is Side.INSIDE or foot.distance <= TOLERANCE for side, foot in sides):
+    if all(b.foot(nearest.p).distance <= TOLERANCE or b.side(nearest.p)[0] is Side.INSIDE for b in boundaries):
         return nearest
     faces = [faces_of(shape, np.arange(sum(1 for _ in explore(shape, "FACE")))) for shape in (first, second)]
     apart = _nearest(*faces)
