@@ -19,7 +19,7 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Ball, Convex, Rod, convex_distance
 from clamp3d.engine.hull import MEMBER
 from clamp3d.geometry.pose import Array, cross, inverse, norm, to_source
-from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
+from clamp3d.geometry.primitives import AnyCylinder, Capsule, Cylinder, SweptArc
 from clamp3d.kernel.distance import SignedDistance, signed_distance
 
 _ROUNDING = 1e-13
@@ -123,13 +123,16 @@ def bore_rod(bore: Bore, rod: Rod | Ball, T: Array) -> Distance:
     In an overlap the capsule that holds the rod gives a lower bound, and the rod's own answer is how deep a point lies.
     """
     covers = [(groove, place, inverse(place) @ T @ rod.T) for groove, place in bore.covers()]
-    tilt = norm(cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2]))
-    is_ball = isinstance(rod, Ball)
-    capsule = Capsule(rod.radius, _POINT * rod.radius if isinstance(rod, Ball) else rod.length)
-    with_ends = capsule if isinstance(rod, Ball) else Cylinder(rod.radius, rod.length)
-    own = [(signed_distance(groove, with_ends, P), place) for groove, place, P in covers]
-    answer, place = min(own, key=lambda cover: cover[0].distance)
-    distance = replace(kernel_distance(answer).moved(place), unique=False if tilt < 1e-12 and not is_ball else None)
+    own: AnyCylinder
+    if isinstance(rod, Ball):
+        own = capsule = Capsule(rod.radius, _POINT * rod.radius)
+        is_parallel = False  # it has no axis
+    else:
+        own, capsule = Cylinder(rod.radius, rod.length), Capsule(rod.radius, rod.length)
+        is_parallel = norm(cross(bore.T[:3, 2], T[:3, :3] @ rod.T[:3, 2])) < 1e-12
+    gaps = [(signed_distance(groove, own, P), place) for groove, place, P in covers]
+    answer, place = min(gaps, key=lambda cover: cover[0].distance)
+    distance = replace(kernel_distance(answer).moved(place), unique=False if is_parallel else None)
     if answer.distance > answer.error_bound:
         return distance
     answers = [signed_distance(groove, capsule, P) for groove, _, P in covers]

@@ -158,6 +158,13 @@ def points_on(face: Any, uv: Array) -> Array:
     return np.asarray(frame[0] + np.column_stack([across * np.cos(u), across * np.sin(u), along]) @ frame[1:])
 
 
+def distinct_points_on(face: Any, uv: Array) -> tuple[Array, NDArray[np.int64]]:
+    """The points (n, 3) of a face's surface at the distinct ones of parameters (k, 2), and which (k,) is whose."""
+    # Triangles share their corners and edges; pairs of numbers are sorted soonest as complex ones.
+    places, rows = np.unique(uv @ (1.0, 1.0j), return_inverse=True)
+    return points_on(face, np.column_stack([places.real, places.imag])), rows.reshape(-1)
+
+
 def height(kind: int, frame: Array, size: Array, points: Array) -> Array:
     """Signed distance (k,) of points (k, 3) from a whole surface; positive on the side of the normal or outside."""
     x, y, z = ((points - frame[0]) @ frame[1:].T).T

@@ -92,11 +92,11 @@ def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
         walk.Next()
 
 
-def faces_of(shape: Any, numbers: IntArray) -> Any:
-    """The faces with these numbers (k,), in the explorer's order, as one TopoDS_Shape."""
+def faces_of(shape: Any, numbers: IntArray | None = None) -> Any:
+    """The faces, or those with these numbers (k,) in the explorer's order, as one TopoDS_Shape without an inside."""
     faces, builder, kept = list(explore(shape, "FACE")), occ.BRep_Builder(), occ.TopoDS_Compound()
     builder.MakeCompound(kept)
-    for number in numbers.tolist():
+    for number in range(len(faces)) if numbers is None else numbers.tolist():
         builder.Add(kept, faces[number])
     return kept
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.boundary import Boundary, Side, vertex
-from clamp3d.files.faces import SPHERE, points_on, surfaces
+from clamp3d.files.faces import SPHERE, distinct_points_on, points_on, surfaces
 from clamp3d.files.open_cascade import (
     TOLERANCE,
     area_of,
@@ -119,8 +119,7 @@ def _confirmed(nearest: Nearest, first: Any, second: Any) -> Nearest:
     boundaries = Boundary(first), Boundary(second)
     if all(b.foot(nearest.p).distance <= TOLERANCE or b.side(nearest.p)[0] is Side.INSIDE for b in boundaries):
         return nearest
-    faces = [faces_of(shape, np.arange(sum(1 for _ in explore(shape, "FACE")))) for shape in (first, second)]
-    apart = _nearest(*faces)
+    apart = _nearest(faces_of(first), faces_of(second))
     points = (apart.q, apart.p)
     is_outside = all(b.side(x)[0] is Side.OUTSIDE for b, x in zip(boundaries, points, strict=True))
     return apart._replace(is_least=is_outside)
@@ -185,9 +184,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         chord = max(chord, SAMPLED * off)
         (middle,) = points_on(face, uv[len(uv) // 2].mean(axis=0, keepdims=True))
         away = [boundary.foot(middle).distance for boundary in boundaries]
-        # Triangles share their corners; pairs of numbers are sorted soonest as complex ones.
-        corners, rows = np.unique(uv.reshape(-1, 2) @ (1.0, 1.0j), return_inverse=True)
-        points = points_on(face, np.column_stack([corners.real, corners.imag]))
+        points, rows = distinct_points_on(face, uv.reshape(-1, 2))
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append((points, rows.reshape(-1, 3)))

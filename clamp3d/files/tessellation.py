@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import OTHER, Surfaces, height, points_on, surfaces
+from clamp3d.files.faces import OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points
@@ -123,9 +123,8 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
     kind = int(form.kind[k])
     if kind == OTHER:
         at = _PLACES @ uv[triangles]
-        # Triangles share places on their edges; pairs of numbers are sorted soonest as complex ones.
-        every, row = np.unique(at.reshape(-1, 2) @ (1.0, 1.0j), return_inverse=True)
-        true, corner = points_on(face, np.column_stack([every.real, every.imag]))[row.reshape(-1)], 0.0
+        places, row = distinct_points_on(face, at.reshape(-1, 2))
+        true, corner = places[row], 0.0
         off = np.linalg.norm(closest_points(np.repeat(points[triangles], len(_PLACES), axis=0), true) - true, axis=1)
     else:
         middles = edge_middles(points[triangles])
