@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Motion, Scene, check, distance, distances, first_contact
@@ -100,3 +100,22 @@ def test_a_sphere_that_slides_0_001_mm_above_its_ground_never_touches_it():
     hit = first_contact(box(60, 20, 2), sphere(5.0), Motion.translate((30, 0, 0)), translation(-15.0, 0.0, 6.001))
     assert not hit.touches
     assert hit.distance.value == pytest.approx(0.001, abs=1e-6)
+
+
+def test_a_sphere_that_grazes_a_post_is_found():
+    """It touches it for 0.2 of 40 mm, at none of the times at which a search that halves would look first."""
+    aside = 6.9995
+    hit = first_contact(cylinder(4.0, 60.0), sphere(3.0), Motion.translate((40, 0, 0)), translation(-17.3, aside, 5.0))
+    assert hit.touches
+    assert hit.t * 40.0 == pytest.approx(17.3 - math.sqrt(49.0 - aside**2), abs=1e-4)
+
+
+@settings(max_examples=10, deadline=None)
+@given(x=places, radius=st.floats(0.5, 4.0), turn=poses)
+def test_a_sphere_beside_a_mesh_that_is_not_convex_is_measured_exactly(x, radius, turn):
+    low, high = trimesh.creation.box((10, 8, 6)), trimesh.creation.box((4, 8, 6)).apply_translation((-3, 0, 6))
+    angle = trimesh.boolean.union([low, high], engine="manifold")
+    true = min(to_box(x, (5.0, 4.0, 3.0)), to_box(x - (-3, 0, 6), (2.0, 4.0, 3.0))) - radius
+    assume(true > 1e-6)
+    answer = distance(angle, sphere(radius), translation(*x) @ turn)
+    assert (answer.lower, answer.upper) == pytest.approx((true, true), abs=1e-7)
