@@ -26,7 +26,7 @@ OTHER_CLAMP = {
     "offset = 49.8315": "offset = 50.6",
     "face_depth = 24.5505": "face_depth = 25.3",
     "apex_thickness = 12.19": "apex_thickness = 11.4",
-    "height = 26.400": "height = 24.0\n\n[joints]\nhole = true\nsaddle = true\nwasher = true\n\n[limits]\nline_load = 90.0",
+    "height = 26.400": "height = 24.0\n[joints]\nhole = true\nsaddle = true\nwasher = true\n[limits]\nline_load = 90.0",
 }
 COMMANDS = {
     "forces": "run OTHER --torque 40 --friction 0.12 --measured 31.4 --groove-friction 0.15",
@@ -60,7 +60,8 @@ def recorded(value):
         return [recorded(item) for item in value]
     if not isinstance(value, dict):
         return round(value, 6) if isinstance(value, float) else value
-    places = {"point", "point_a", "point_b", "normal"} if value.get("unique") is not True and "level" in value else set()
+    is_unique = "level" not in value or value["unique"] is True
+    places = set() if is_unique else {"point", "point_a", "point_b", "normal"}
     return {key: recorded(item) for key, item in value.items() if key not in NOT_RECORDED | places}
 
 
