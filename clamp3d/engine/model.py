@@ -284,8 +284,10 @@ class CadModel(Model):
         """Bodies around the solid with the cylinders and holes that its faces name; None without any."""
         if not self.chords:
             return None
-        mesh = self._mesh(CHORD, inside=False)
-        assert mesh is not None
+        try:
+            mesh = self.outer(CHORD, thorough=True)
+        except Clamp3dError:
+            return None
         if not (self.shape.surfaces.kind == CYLINDER).any():
             return self._hull_of_convex(mesh)
         from clamp3d.engine.fitted import bodies_of_fit
@@ -311,6 +313,8 @@ class CadModel(Model):
 
     def _surface(self, chord: float, inside: bool) -> Surface:
         mesh = self.shape.tessellated(chord)
+        if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
+            raise Clamp3dError(f"the triangles of {self.name} do not close")
         errors = at_edges(mesh.vertices, mesh.faces, mesh.errors, mesh.face, SMOOTH)
         return Surface(mesh.vertices, mesh.faces, errors)
 

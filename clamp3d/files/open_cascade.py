@@ -101,10 +101,13 @@ def faces_of(shape: Any, numbers: IntArray | None = None) -> Any:
     return kept
 
 
-def bounds_of(shape: Any) -> Array:
-    """Lower and upper corner (2, 3) of a box that holds a TopoDS_Shape, mm."""
+def bounds_of(shape: Any, *, quick: bool = False) -> Array:
+    """Lower and upper corner (2, 3) of a box that holds a TopoDS_Shape, mm; a larger one if ``quick``."""
     box = occ.Bnd_Box()
-    occ.BRepBndLib.AddOptimal_s(shape, box, False, False)
+    if quick:
+        occ.BRepBndLib.Add_s(shape, box, False)
+    else:
+        occ.BRepBndLib.AddOptimal_s(shape, box, False, False)
     return np.array([box.CornerMin().Coord(), box.CornerMax().Coord()])
 
 

@@ -25,7 +25,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, SAMPLED, edge_middles, triangles_of
+from clamp3d.files.tessellation import ANGLE, SAMPLED, covers, edge_middles, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
 
@@ -37,6 +37,8 @@ _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
 _COARSER = 16.0
 """How much coarser Open CASCADE meshes the inside of a common part's faces than their edges."""
+_FINER_EDGES = (1.0, 0.3, 0.1)
+"""Shares of a chord that a common part's edges are meshed with, until all of its faces have triangles."""
 _SAMPLES = 500
 """Triangles that a face of a common part is cut into at least, to find where it is deepest."""
 _MOST_SAMPLES = 100_000
@@ -168,17 +170,17 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     shape = _common_shape(a, b, np.asarray(T).tobytes())
     if next(explore(shape, "SOLID"), None) is None:
         return CommonPart(0.0, 0.0, np.zeros((2, 3)))
-    volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape)
+    volume, area, box = abs(volume_of(shape)), area_of(shape), bounds_of(shape, quick=share is not None)
     if share is None:
         return CommonPart(volume, area, box, volumes=volumes_of(shape))
     size = float(np.linalg.norm(box[1] - box[0]))
     sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
-    _mesh_borders(shape, sag)
+    meshes = _meshed(shape, sag)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[tuple[Array, IntArray]], ...] = ([], [])
     chord = sag
-    for k, face in enumerate(explore(shape, "FACE")):
-        uv, off = _samples(face, k, sag)
+    for face, mesh in zip(explore(shape, "FACE"), meshes, strict=True):
+        uv, off = _samples(face, *mesh, sag)
         if not len(uv):
             continue
         chord = max(chord, SAMPLED * off)
@@ -191,16 +193,24 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     return CommonPart(volume, area, box, tuple(map(_joined, sides)), chord)
 
 
-def _mesh_borders(shape: Any, chord: float) -> None:
-    """Triangles of the faces of a TopoDS_Shape: their edges are within ``chord`` mm, the inside of faces is coarser.
+def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
+    """The triangles of each face of a TopoDS_Shape, as `triangles_of` gives them.
 
-    Open CASCADE takes seconds to mesh the inside of slender free-form faces finely: `_samples` does.
+    Their edges are within ``chord`` mm, the inside of faces is coarser: Open CASCADE takes seconds to mesh
+    that of slender free-form faces finely, `_samples` does. Of slender plane faces it can leave out nearly all, and
+    does not say so; finer edges help. Raises Clamp3dError where they do not.
     """
     how = occ.IMeshTools_Parameters()
-    how.Deflection, how.DeflectionInterior = chord, _COARSER * chord
     how.Angle = how.AngleInterior = ANGLE
-    occ.BRepTools.Clean_s(shape)
-    occ.BRepMesh_IncrementalMesh(shape, how)
+    for share in _FINER_EDGES:
+        how.Deflection, how.DeflectionInterior = share * chord, _COARSER * share * chord
+        occ.BRepTools.Clean_s(shape)
+        occ.BRepMesh_IncrementalMesh(shape, how)
+        faces = [*explore(shape, "FACE")]
+        meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
+        if all(covers(face, triangles) for face, (_, triangles, _) in zip(faces, meshes, strict=True)):
+            return meshes
+    raise Clamp3dError("Open CASCADE leaves out some of a face of the common part of the two solids")
 
 
 def _joined(side: list[tuple[Array, IntArray]]) -> Border:
@@ -211,7 +221,7 @@ def _joined(side: list[tuple[Array, IntArray]]) -> Border:
     return Border(np.vstack([np.empty((0, 3)), *(points for points, _ in side)]), np.vstack([no_rows, *triangles]))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=512)
 def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     """The common part as a TopoDS_Shape, kept for who asks for its depth, its volume or finer samples."""
     # Of new copies, since it widens the tolerances of what it is given; a mesh of that is as coarse as these.
@@ -221,12 +231,11 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, number: int, sag: float) -> tuple[Array, float]:
+def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, float]:
     """Triangles (m, 3, 2) of a meshed face in its surface's parameters, and how far (mm) an edge's middle is from it.
 
     They are cut in two at the middle of an edge until no middle is farther than ``sag`` mm, or there are too many.
     """
-    points, triangles, uv = triangles_of(face, number)
     corners, ends = uv[triangles], points[triangles]
     finished, count, farthest = [np.empty((0, 3, 2))], len(triangles), 0.0
     while len(corners):

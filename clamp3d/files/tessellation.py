@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -188,16 +189,13 @@ def edge_middles(corners: Array) -> Array:
 
 def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
-    triangulation = occ.BRep_Tool.Triangulation_s(face, place := occ.TopLoc_Location())
     sag_of: dict[int, float] = {}
-    for edge in explore(face, "EDGE"):
-        polygon, curve = occ.BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place), None
-        if polygon is not None and not occ.BRep_Tool.Degenerated_s(edge):
-            curve = occ.BRepAdaptor_Curve(edge)
-        if curve is None or curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line:
+    for edge, nodes, at in _border(face):
+        if occ.BRep_Tool.Degenerated_s(edge):
             continue
-        count = range(1, polygon.NbNodes() + 1)
-        nodes, at = np.array([polygon.Node(i) - 1 for i in count]), np.array([polygon.Parameter(i) for i in count])
+        curve = occ.BRepAdaptor_Curve(edge)
+        if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line:
+            continue
         is_circle = curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle
         factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
         times = at[:-1, None] + np.diff(at)[:, None] * shares
@@ -210,6 +208,27 @@ def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))
     errors[on_border] = [sag_of[key] for key in keys[on_border].tolist()]
     return np.asarray(errors.max(axis=1))
+
+
+def covers(face: Any, triangles: IntArray) -> bool:
+    """Whether the triangles (m, 3) of a meshed face end at its border alone: Open CASCADE can leave some out."""
+    border = [_edge_keys(nodes[:-1], nodes[1:]) for _, nodes, _ in _border(face)]
+    keys, count = np.unique(_edge_keys(triangles, np.roll(triangles, -1, axis=1)), return_counts=True)
+    return bool(np.isin(keys[count == 1], np.concatenate(border)).all())
+
+
+def _border(face: Any) -> Iterator[tuple[Any, IntArray, Array]]:
+    """The edges of a meshed face, each with its nodes (k,) in the triangulation, and their parameters (k,)."""
+    triangulation = occ.BRep_Tool.Triangulation_s(face, place := occ.TopLoc_Location())
+    for edge in explore(face, "EDGE"):
+        polygon = occ.BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place)
+        if polygon is not None:
+            count = range(1, polygon.NbNodes() + 1)
+            yield (
+                edge,
+                np.array([polygon.Node(i) - 1 for i in count]),
+                np.array([polygon.Parameter(i) for i in count]),
+            )
 
 
 def _edge_keys(a: IntArray, b: IntArray) -> IntArray:
