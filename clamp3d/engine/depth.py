@@ -15,9 +15,9 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
-from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance, exact_overlap
+from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import QUICK_TRIANGLES, Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.refine import SHARES, from_boxes, refine
 from clamp3d.engine.surface import Surface
@@ -27,6 +27,8 @@ from clamp3d.geometry.pose import Array, to_target
 
 _DIRECTIONS = 4
 """Flat sides of the overlap along which the bodies are moved apart."""
+_PARALLEL = 1.0 - 1e-6
+"""Cosine of the angle of two directions from which on one of them is tried."""
 _SHARES = np.array([0.25, 0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 4.0])
 """Lengths of a translation that are tried, in extents of the overlap: the way back into a hole is about one, and of all
 lengths only those that take a pin to within its play of the hole's axis are free.
@@ -116,7 +118,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, thorough: b
         return replace(distance, lower=-np.inf, interference=(depth, at_most))
     method = distance.method
     if is_long:
-        own = _interference(a, b, meshes, thorough)
+        own = _interference(a, b, meshes, depth, thorough)
         depth, at_most, method = max(depth, -own.upper), min(at_most, -own.lower), own.method or method
     upper = min(distance.upper, -depth) if depth > 0.0 else distance.upper
     return replace(
@@ -231,14 +233,19 @@ def _is_long(way: Distance, meshes: _OverlappingMeshes) -> bool:
     return -way.lower > LONG * (meshes.hidden - way.upper)
 
 
-def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, thorough: bool) -> Distance:
-    """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by the finest meshes."""
+def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, thorough: bool) -> Distance:
+    """Bounds of minus the interference by itself: by Open CASCADE for solids from CAD, else by meshes.
+
+    ``depth`` (mm): that of a point.
+    """
     own = Distance()
     if a.exact is not None and b.exact is not None:
-        own = exact_overlap(a, b, meshes.T, SHARES[1])
+        own = exact_overlap(a, b, meshes.T, SHARES[1], attested=depth)
         if np.isfinite(own.lower):
             return own
-        *_, meshes = _overlapping_meshes(a, b, meshes.T, thorough)
+        own = exact_probe(a, b, meshes.T)
+        if thorough or a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES:
+            *_, meshes = _overlapping_meshes(a, b, meshes.T, thorough)
     most = thickness(meshes.a, meshes.b, meshes.T, meshes.shared, _is_sharp, FEW_CUTS)
     return replace(own, lower=-meshes.hidden - most, method="")
 
@@ -253,8 +260,9 @@ def _way_by_meshes(meshes: _OverlappingMeshes, depth: float) -> tuple[float, Arr
     off = a.error + b.error + rounding_of(a, b, T)
     slack = 2.0 * off
     # Where two faces hold a body, as a V does, its way out is between their normals.
-    candidates = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
-    directions = np.repeat(candidates, 2, axis=0) * np.tile([[1.0], [-1.0]], (len(candidates), 1))
+    axes = np.vstack([shared.mean_normal(a), shared.directions(_DIRECTIONS), np.eye(3), T[:3, :3].T])
+    is_repeated = np.tril(np.abs(axes @ axes.T) > _PARALLEL, -1).any(axis=1)
+    directions = np.vstack([(axis, -axis) for axis in axes[~is_repeated]])
     # A plane parts them after this length at the latest.
     extents = (a.vertices @ directions.T).max(axis=0) - (to_target(T, b.vertices) @ directions.T).min(axis=0) + off
     best, way = float(extents.min()), directions[extents.argmin()]

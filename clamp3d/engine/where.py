@@ -93,13 +93,13 @@ class Locator:
         if not all(model.chords for model in models):
             yield self._exact()
             return
+        chords = sorted({chord for model in models for chord in model.chords}, reverse=True)
+        yield self._at(chords[0])
+        yield self._exact()
         solids = [] if self.thorough else [model for model in models if model.exact is not None]
         is_large = sum(solid.fine_triangles for solid in solids) > QUICK_TRIANGLES
         finest = max(solid.fine_chord for solid in solids) if is_large else 0.0
-        chords = sorted({max(chord, finest) for model in models for chord in model.chords}, reverse=True)
-        yield self._at(chords[0])
-        yield self._exact()
-        for chord in chords[1:]:
+        for chord in sorted({max(chord, finest) for chord in chords[1:]}, reverse=True):
             with suppress(Clamp3dError):  # of solids from CAD fine ones may take too long to make
                 yield self._at(chord)
 
