@@ -15,7 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from clamp3d.baselines import METHODS, contact_model
-from clamp3d.cli.terminal import STDOUT_TAKEN, narrator, show
+from clamp3d.cli.terminal import STDOUT_TAKEN, bar, show
 from clamp3d.errors import need
 
 if TYPE_CHECKING:
@@ -202,12 +202,12 @@ class Quiet:
             if not self.quiet:
                 show(f"{waypoint.step:14s} {waypoint.label}", err=True)
 
-        with narrator(self.quiet) as say:
+        with bar(self.quiet) as report:
             return assemble(
                 clamp,
                 model,
                 on_waypoint=listen,
-                progress=lambda tried, distance: say(f"closing: {tried} positions tried, {distance:.3f} mm"),
+                progress=lambda n, distance: report(f"closing: {n} positions tried, {distance:.3f} mm"),
                 **settings,
             )
 
