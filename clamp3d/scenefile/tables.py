@@ -154,7 +154,6 @@ class FileTable(PartTable, kw_only=True):
 class MeshTable(FileTable, kw_only=True):
     """``shape = "mesh"``: a file of one body, in its own frame; see `MeshShape` for ``fit``."""
 
-
     def read(self, folder: Path) -> Scene:
         """The part, not yet moved or renamed."""
         scene = super().read(folder)
