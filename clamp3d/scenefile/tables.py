@@ -179,9 +179,10 @@ SHAPES: dict[str, type[AnyTable]] = {
 
 def part_table(data: Any, origin: str, key: str) -> AnyTable:
     """The table of a part, by its ``shape`` or as a file. Raises InputError."""
-    shape = data.get("shape") if isinstance(data, dict) else None
+    keys = data if isinstance(data, dict) else {}
+    shape = keys.get("shape")
     kind: type[AnyTable] | None = SHAPES.get(shape) if isinstance(shape, str) else None
-    if isinstance(data, dict) and "file" in data and "shape" not in data:
+    if "file" in keys and "shape" not in keys:
         kind = FileTable
     if kind is None:
         choices = ", ".join(f'"{name}"' for name in SHAPES)
@@ -191,7 +192,7 @@ def part_table(data: Any, origin: str, key: str) -> AnyTable:
             + (f", got {checks.shown(shape)}" if shape is not None else "")
             + (f"; did you mean {near[0]}?" if near else "")
         )
-    table: AnyTable = validate(kind, {name: value for name, value in data.items() if name != "shape"}, origin, key)
+    table: AnyTable = validate(kind, {name: value for name, value in keys.items() if name != "shape"}, origin, key)
     return table
 
 
