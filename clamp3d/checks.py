@@ -28,12 +28,10 @@ def shown(value: object) -> str:
     >>> shown("a" * 200)[-12:]
     'aaaaaaaa ...'
     """
-    if isinstance(value, np.ndarray):
+    if isinstance(value, (np.ndarray, np.generic)):
         if value.size > 6:
             return f"array of shape {value.shape}"
         value = value.tolist()
-    if isinstance(value, np.generic):
-        value = value.item()
     try:
         text = repr(value[:80] if isinstance(value, (str, bytes)) else value)
     except Exception:  # an int with more digits than Python prints; an object without a repr
@@ -69,8 +67,6 @@ def number(name: str, value: object, *, rule: str = "be a finite number") -> flo
     >>> number("angle", np.float32(0.5))
     0.5
     """
-    if isinstance(value, float) and math.isfinite(value):
-        return float(value)  # NumPy's float64 is a float
     x = real(value)
     if x is None or not math.isfinite(x):
         raise InputError(f"{name} must {rule}, got {shown(value)}")

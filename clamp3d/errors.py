@@ -85,11 +85,7 @@ def need(library: str, what: str) -> None:
 
     >>> need("matplotlib", "a drawing")
     """
-    try:
-        is_missing = importlib.util.find_spec(library) is None
-    except ValueError:
-        is_missing = True
-    if is_missing:
+    if importlib.util.find_spec(library) is None:
         raise missing(library, what)
 
 

@@ -9,12 +9,12 @@ from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import (
     INPUT_FILE,
     JSON,
+    SOURCE,
     Output,
     Quiet,
     Source,
     argument,
     command,
-    complete_inputs,
     couples,
     number,
     option,
@@ -53,7 +53,7 @@ class Check(Source, Quiet):
     fewer than two parts.
     """
 
-    source: str = argument(metavar="INPUT", required=True, shell_complete=complete_inputs)
+    source: str = argument(metavar="INPUT", required=True, type=SOURCE)
     pairs: list[tuple[str, str]] | None = option(
         "Only these pairs, for instance P1:P6,P2:P7.", type=name_pairs, metavar="A:B,..."
     )
@@ -121,7 +121,7 @@ class Accept:
     They are written to INPUT.accepted.toml beside the file, and no longer count for the exit code of check.
     """
 
-    source: str = argument(metavar="INPUT", shell_complete=complete_inputs)
+    source: str = argument(metavar="INPUT", type=SOURCE)
     identifiers: tuple[str, ...] = argument(metavar="ID...", nargs=-1, required=True)
     why: str = option("The reason.", required=True, metavar="TEXT")
     who: str = option("Who accepts it.  [default: the login name]", default="", show_default=False, metavar="NAME")

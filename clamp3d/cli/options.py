@@ -12,10 +12,9 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 import click
-from click.shell_completion import CompletionItem
 
 from clamp3d.baselines import METHODS, contact_model
-from clamp3d.cli.terminal import STDOUT_TAKEN, narrator, show
+from clamp3d.cli.terminal import STDOUT_TAKEN, bar, show
 from clamp3d.errors import need
 
 if TYPE_CHECKING:
@@ -86,6 +85,8 @@ class Output(click.Path):
         return path
 
 
+SOURCE = click.Path(readable=False)
+"""What `clamp3d.load` takes as a text: the shell completes it as a file."""
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -175,12 +176,6 @@ def _wires(context: click.Context, parameter: click.Parameter, incomplete: str) 
     return [name for name in catalogue() if name.lower().startswith(incomplete.lower())]
 
 
-def complete_inputs(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Files and the built-in clamp, for tab completion."""
-    built_in = [CompletionItem("reference")] if incomplete and "reference".startswith(incomplete) else []
-    return [*built_in, CompletionItem(incomplete, type="file")]
-
-
 CLEARANCE = option("Gap that parts must keep.  [default: 5 for a clamp; the scene's own]", metavar="MM")
 JSON = option("Write the result as JSON; - is stdout.", "--json")
 
@@ -202,12 +197,12 @@ class Quiet:
             if not self.quiet:
                 show(f"{waypoint.step:14s} {waypoint.label}", err=True)
 
-        with narrator(self.quiet) as say:
+        with bar(self.quiet) as report:
             return assemble(
                 clamp,
                 model,
                 on_waypoint=listen,
-                progress=lambda tried, distance: say(f"closing: {tried} positions tried, {distance:.3f} mm"),
+                progress=lambda n, distance: report(f"closing: {n} positions tried, {distance:.3f} mm"),
                 **settings,
             )
 
@@ -215,7 +210,7 @@ class Quiet:
 class ClampSource:
     """The clamp that a command is to work on."""
 
-    source: str = argument(metavar="[CLAMP]", default="reference", required=False, shell_complete=complete_inputs)
+    source: str = argument(metavar="[CLAMP]", default="reference", required=False, type=SOURCE)
     line: str | None = option(
         "Power line: catalogue name or diameter in mm.", metavar="CONDUCTOR", shell_complete=_wires
     )
@@ -231,7 +226,7 @@ class ClampSource:
 class Source(ClampSource):
     """What a command is to work on: a clamp, a scene or a file with parts."""
 
-    source: str = argument(metavar="[INPUT]", default="reference", required=False, shell_complete=complete_inputs)
+    source: str = argument(metavar="[INPUT]", default="reference", required=False, type=SOURCE)
     unit: Unit | None = option("Unit of a mesh file.  [default: mm; m for glTF]", "--input-unit")
     fit: Literal["off", "round"] | None = option(
         "Round surfaces of a mesh file: off: its facets are the part; round: fitted.  [default: off]"

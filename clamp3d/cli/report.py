@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import CLEARANCE, FOLDER, Method, Source, command, option
-from clamp3d.cli.terminal import finish, narrator, show
+from clamp3d.cli.terminal import bar, finish, show
+from clamp3d.engine.scene import Scene
 from clamp3d.errors import need
 
 
@@ -31,16 +33,15 @@ class Report(Source, Method):
 
         settings = self.settings()
         check_folder(self.output)
-        loaded = self.load()
-        if not isinstance(loaded, Clamp):
+        subject: Assembly | Clamp | Scene = self.load()
+        if isinstance(subject, Clamp):
+            subject = self.assemble(subject, self.model(subject), settings)
+        else:
             self.refuse_method()
-        subject = self.assemble(loaded, self.model(loaded), settings) if isinstance(loaded, Clamp) else loaded
-        with narrator(self.quiet) as narrate:
-            review = make_report(subject, clearance=self.clearance, progress=narrate)
-            paths = write_report(review, self.output, progress=narrate)
+        with bar(self.quiet) as report:
+            review = make_report(subject, clearance=self.clearance, progress=report)
+            paths = write_report(review, self.output, progress=report)
         for path in paths:
             show(str(path))
-        if review.assembly is not None:
-            finish(not review.passed)
-        else:
-            finish(verdicts={row.verdict for row in (*review.rows, *review.motions)})
+        verdicts = {row.verdict for row in (*review.rows, *review.motions)}
+        finish(review.assembly is not None and not review.passed, verdicts=verdicts)

@@ -124,7 +124,5 @@ class Run(ClampSource, Method, Mechanics, Viewing):
 
     def _show(self, result: Assembly) -> None:
         text, data = self.mechanics(result)  # first: it may refuse a value
-        show(run_to_text(result))
-        if text:
-            show(text)
+        show("\n".join(filter(None, [run_to_text(result), text])))
         save(self.json_file, lambda: result.to_dict() | data)

@@ -114,23 +114,13 @@ def prepare_streams() -> None:
 
 
 @contextmanager
-def narrator(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A function that says on stderr what is going on now; silent if ``quiet``, or if stderr is no terminal."""
+def bar(quiet: bool) -> Iterator[Callable[..., None]]:
+    """A function ``report(stage, done=0.0, of=None)``, which says on stderr what is going on and how long it takes.
+
+    Without ``of`` that is not known. Silent if ``quiet``, or if stderr is no terminal.
+    """
     if quiet or not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(Text(escaped(text)))
-
-
-@contextmanager
-def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
-    """A function ``report(stage, done, of)`` that moves a bar with the time left; silent if stderr is no terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda stage, done, of: None
+        yield lambda stage, done=0.0, of=None: None
         return
     from rich.console import Console
     from rich.markup import escape
@@ -138,4 +128,6 @@ def bar(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
 
     with Progress(console=Console(stderr=True), transient=True) as shown:
         task = shown.add_task("", total=None)
-        yield lambda stage, done, of: shown.update(task, description=escape(escaped(stage)), completed=done, total=of)
+        yield lambda stage, done=0.0, of=None: shown.update(
+            task, description=escape(escaped(stage)), completed=done, total=of
+        )

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.errors import Clamp3dError
 from clamp3d.files.bodies import Component, Reading
 from clamp3d.files.open_cascade import explore, matrix, occ, volume_of
 from clamp3d.files.solid import BrepSolid
@@ -107,10 +106,7 @@ def _leaves(nodes: Iterable[Node], assembly: Component | None) -> Iterator[tuple
 
 def _shape(solid: Any, name: str) -> BrepSolid | str:
     """The solid as a shape, or why it cannot be one."""
-    try:
-        size = volume_of(solid)
-        if not abs(size) > 0.0:
-            return "encloses no volume"
-        return BrepSolid.of(solid if size > 0.0 else solid.Reversed(), name)
-    except Clamp3dError as error:
-        return str(error)
+    size = volume_of(solid)
+    if not abs(size) > 0.0:
+        return "encloses no volume"
+    return BrepSolid.of(solid if size > 0.0 else solid.Reversed(), name)

@@ -62,6 +62,11 @@ class Worker:
     confined : bool
         Whether connections to other machines and further processes are refused in it.
 
+    Attributes
+    ----------
+    log : deque of str
+        The last lines that the process printed.
+
     Examples
     --------
     >>> with Worker() as worker:
@@ -73,7 +78,7 @@ class Worker:
         self._confined = confined
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
-        self._lines: deque[str] = deque(maxlen=50)
+        self.log: deque[str] = deque(maxlen=50)
         self._listener = threading.Thread()
 
     def __enter__(self) -> Worker:
@@ -81,11 +86,6 @@ class Worker:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    @property
-    def log(self) -> list[str]:
-        """The last lines that the process printed."""
-        return [line for line in list(self._lines) if line]
 
     def call(
         self, function: str, *arguments: Any, time_limit: float, cpu: float | None = None, memory: float | None = None
@@ -156,8 +156,8 @@ class Worker:
             env=os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
             start_new_session=True,
         )
-        self._lines = deque(maxlen=50)
-        self._listener = threading.Thread(target=_keep_lines, args=(process.stderr, self._lines), daemon=True)
+        self.log = deque(maxlen=50)
+        self._listener = threading.Thread(target=_keep_lines, args=(process.stderr, self.log), daemon=True)
         self._listener.start()
         return process
 
@@ -180,9 +180,10 @@ class Worker:
         if time.monotonic() >= deadline or code == -_CPU_SIGNAL:
             raise WorkerTimeoutError("no answer in its time")
         self._listener.join(timeout=5.0)
-        if any(word in line for line in self.log for word in _OUT_OF_MEMORY):
+        log = [*self.log]
+        if any(word in line for line in log for word in _OUT_OF_MEMORY):
             raise MemoryError
-        raise WorkerEndedError(code, self.log)
+        raise WorkerEndedError(code, log)
 
 
 def serve(*, confined: bool) -> None:
@@ -216,10 +217,8 @@ def _answer(function: str, arguments: tuple[Any, ...]) -> bytes:
     try:
         module, _, name = function.partition(":")
         return pickle.dumps((None, getattr(importlib.import_module(module), name)(*arguments)))
-    except (Clamp3dError, MemoryError) as raised:
+    except (Clamp3dError, MemoryError, OSError) as raised:
         error = raised
-    except OSError as raised:
-        error = OSError(f"{raised.filename}: {raised.strerror}" if raised.filename else str(raised))
     except Exception as raised:  # a fault of the function: the caller says so
         frame = traceback.extract_tb(raised.__traceback__)[-1]
         error = RuntimeError(f"{type(raised).__name__}: {raised} at {os.path.basename(frame.filename)}:{frame.lineno}")
@@ -241,12 +240,12 @@ def _limit(memory: float | None) -> None:
     used = 0
     with suppress(OSError):
         used = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
-    most = resource.RLIM_INFINITY if memory is None else int(memory) + used
-    for kind, value in ((resource.RLIMIT_DATA, most), (resource.RLIMIT_CORE, 0)):
-        _, hard = resource.getrlimit(kind)
-        if hard != resource.RLIM_INFINITY:
-            value = hard if value == resource.RLIM_INFINITY else min(value, hard)
-        resource.setrlimit(kind, (value, hard))
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    most = hard if memory is None else used + int(memory)
+    if 0 <= hard < most:  # infinity is -1, or more than any
+        most = hard
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _limit_cpu(seconds: float | None) -> None:
@@ -263,7 +262,8 @@ def _send(pipe: IO[bytes], message: bytes) -> None:
 def _keep_lines(pipe: IO[bytes], lines: deque[str]) -> None:
     with suppress(OSError, ValueError):
         for line in pipe:
-            lines.append(line.decode(errors="replace").strip())
+            if text := line.decode(errors="replace").strip():
+                lines.append(text)
 
 
 def end_with_parent() -> None:

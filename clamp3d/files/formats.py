@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from clamp3d import checks
-from clamp3d.errors import Clamp3dError, InputError
+from clamp3d.errors import Clamp3dError, InputError, need
 from clamp3d.files.bodies import Reading
 from clamp3d.files.worker import OUTSIDE, read_in_process
 from clamp3d.geometry.mesh import Mesh
@@ -33,10 +33,13 @@ class Format(NamedTuple):
         Module and function of ``clamp3d.files`` that reads them.
     unit : str or None
         Unit that the format fixes ("stated": each file states it; None: neither does).
+    library : str or None
+        Optional library that the reader needs and does not ask for itself.
     """
 
     reader: str
     unit: str | None = None
+    library: str | None = None
 
 
 _MESH = Format("triangle_file:read_triangles")
@@ -49,20 +52,23 @@ FORMATS: dict[str, Format] = {
     ".off": _MESH,
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    ".3mf": Format("threemf_file:read_3mf", "stated"),
+    ".3mf": Format("threemf_file:read_3mf", "stated", "lib3mf"),
     ".step": _STEP,
     ".stp": _STEP,
 }
 """Readable formats of geometry by the ending of the file's name."""
 ROBOT = ".urdf"
 """The ending of robot descriptions, whose links are drawn or name files of geometry."""
+_ROBOT = Format("urdf_file:read_urdf", "stated", "yourdfpy")
 
 
 def read(path: Path, option: Any = None) -> Reading:
     """The bodies of a file, read in this process; ``option`` is one of `UNITS_MM`, or the joints of a robot."""
     kind = path.suffix.lower()
-    reader = "urdf_file:read_urdf" if kind == ROBOT else FORMATS[kind].reader
-    module, _, function = reader.partition(":")
+    form = _ROBOT if kind == ROBOT else FORMATS[kind]
+    if form.library is not None:
+        need(form.library, kind[1:].upper())
+    module, _, function = form.reader.partition(":")
     try:
         reading: Reading = getattr(importlib.import_module(f"clamp3d.files.{module}"), function)(path, option)
         return reading

@@ -75,8 +75,6 @@ def from_bytes(brep: bytes) -> Any:
 
 def parse(brep: bytes) -> Any:
     """A new TopoDS_Shape of the bytes. Raises MissingLibraryError without Open CASCADE."""
-    require_open_cascade()
-
     shape = occ.TopoDS_Shape()
     occ.BinTools.Read_s(shape, io.BytesIO(brep))
     return shape

@@ -9,7 +9,6 @@ import numpy as np
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.geometry.mesh import Array, IntArray, make_mesh
-from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.geometry.shapes import MeshShape
 
 
@@ -55,10 +54,9 @@ class Placer(Reading):
 def rigid_part(T: Array) -> tuple[Array, Array]:
     """A placement (4, 4) as a rigid pose after a scale, shear or reflection (3, 3): the identity where it is rigid."""
     R = T[:3, :3]
-    pose = T.copy()
-    deviation = np.abs(R @ R.T - np.eye(3)).max()
-    if deviation <= 1e-5 and np.linalg.det(R) > 0.0:  # written with few digits
-        return nearest_rigid(T) if deviation > 1e-12 else pose, np.eye(3)
     left, _, right = np.linalg.svd(R)
+    pose = T.copy()
     pose[:3, :3] = turn = left * (1.0, 1.0, np.sign(np.linalg.det(R))) @ right
-    return pose, turn.T @ R
+    form = turn.T @ R
+    is_rigid = np.abs(form - np.eye(3)).max() <= 5e-6  # written with few digits
+    return pose, np.eye(3) if is_rigid else form

@@ -14,17 +14,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import lib3mf
 import numpy as np
 
-from clamp3d.errors import InputError, missing
+from clamp3d.errors import InputError
 from clamp3d.files.bodies import MOST_BODIES, Reading
 from clamp3d.files.placing import Placer
 from clamp3d.geometry.mesh import Array
-
-try:
-    import lib3mf
-except ImportError:
-    raise missing("lib3mf", "3MF") from None
 
 _UNITS = {"MicroMeter": 1e-3, "MilliMeter": 1.0, "CentiMeter": 10.0, "Meter": 1000.0, "Inch": 25.4, "Foot": 304.8}
 _HARMLESS = re.compile("attribute|namespace|metadata|texture|thumbnail|colou?r|propert|uuid", re.IGNORECASE)

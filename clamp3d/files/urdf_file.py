@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import networkx  # which yourdfpy needs
 import numpy as np
+import yourdfpy
 
 from clamp3d import checks
-from clamp3d.errors import InputError, missing
+from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import FORMATS, read
 from clamp3d.files.placing import Placer
@@ -26,13 +28,6 @@ from clamp3d.files.worker import OUTSIDE, may_read
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import nearest_rigid
 from clamp3d.geometry.shapes import Shape, box, cylinder, sphere
-
-try:
-    import networkx  # which yourdfpy needs
-    import yourdfpy
-except ImportError:
-    raise missing("yourdfpy", "URDF") from None
-
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 """Those of the URDF specification."""

@@ -6,8 +6,8 @@ A damaged file can end the interpreter, a small archive can unpack to gigabytes.
 from __future__ import annotations
 
 import atexit
-import math
 import os
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,11 +88,9 @@ def named_file(path: Path, name: str) -> Path:
 
 
 def _factor() -> float:
+    """The user's factor for the limits."""
     text = os.environ.get(LIMITS, "1")
-    try:
-        factor = float(text)
-    except ValueError:
-        factor = math.nan
-    if not 0.0 < factor < 1e6:
-        raise InputError(f"{LIMITS} must be a number > 0, got {text!r}")
-    return factor
+    with suppress(ValueError):
+        if 0.0 < (factor := float(text)) < 1e6:
+            return factor
+    raise InputError(f"{LIMITS} must be a number > 0, got {text!r}")

@@ -50,7 +50,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
     parts: list[Part] = []
     allowed: list[Allowed] = []
     notes: list[str] = []
-    scenes: dict[bytes, Scene] = {}
+    scenes: dict[tuple[type, bytes], Scene] = {}
     where = "clamp"
 
     def take(scene: Scene, of: str) -> None:
@@ -69,7 +69,7 @@ def parse_scene(text: str, *, origin: str = "scene", folder: Path = Path(), name
             if not isinstance(part, FileTable):
                 parts.append(Part(part_name, shapes.as_shape(part.make(folder)), part.pose.T()))
                 continue
-            same = msgspec.json.encode(msgspec.structs.replace(part, pose=Pose()))
+            same = type(part), msgspec.json.encode(msgspec.structs.replace(part, pose=Pose()))
             if same not in scenes:  # a file is read once, and its shapes are shared
                 scenes[same] = part.read(folder)
             take(prefixed(scenes[same], part_name, part.pose.T()), part_name)

@@ -33,7 +33,7 @@ class Pose(Table):
     axis: Vector | None = None
     angle_deg: Angle | None = None
     quaternion: tuple[Number, Number, Number, Number] | None = None
-    matrix: list[tuple[Number, Number, Number, Number]] | None = None
+    matrix: Annotated[list[tuple[Number, Number, Number, Number]], Meta(min_length=3, max_length=4)] | None = None
 
     def __post_init__(self) -> None:
         turns = [k for k in ("rpy_deg", "axis", "quaternion", "matrix") if getattr(self, k) is not None]
@@ -50,8 +50,6 @@ class Pose(Table):
         if self.matrix is not None:
             if any(self.translation):
                 raise ValueError("matrix: holds the translation already")
-            if len(self.matrix) not in (3, 4):
-                raise ValueError(f"matrix: must have 3 or 4 rows of 4 numbers, got {len(self.matrix)}")
             self.T()
 
     def T(self) -> Array:

@@ -58,7 +58,6 @@ class PartTable(Table):
 class CylinderTable(PartTable, kw_only=True):
     """``shape = "cylinder"``: axis on z, centred; the diameter may be a conductor's."""
 
-    shape: Literal["cylinder"]
     length: Length
     radius: Length | None = None
     diameter: Length | None = None
@@ -78,7 +77,6 @@ class CylinderTable(PartTable, kw_only=True):
 class BoxTable(PartTable, kw_only=True):
     """``shape = "box"``: centred, with round holes."""
 
-    shape: Literal["box"]
     size: tuple[Length, Length, Length]
     holes: list[HoleTable] = field(default_factory=list)
 
@@ -90,7 +88,6 @@ class BoxTable(PartTable, kw_only=True):
 class SphereTable(PartTable, kw_only=True):
     """``shape = "sphere"``: about the origin."""
 
-    shape: Literal["sphere"]
     radius: Length | None = None
     diameter: Length | None = None
 
@@ -105,7 +102,6 @@ class SphereTable(PartTable, kw_only=True):
 class GrooveBlockTable(PartTable, kw_only=True):
     """``shape = "groove-block"``: in the groove's frame, arc about the origin, axis on z, mouth to +y."""
 
-    shape: Literal["groove-block"]
     radius: Length
     half_angle_deg: Annotated[float, Meta(gt=0.0, lt=180.0)]
     length: Length
@@ -125,7 +121,6 @@ class GrooveBlockTable(PartTable, kw_only=True):
 class ClampPartTable(PartTable, kw_only=True):
     """``shape = "clamp-part"``: one of the seven parts of a clamp, in its own frame."""
 
-    shape: Literal["clamp-part"]
     part: ClampPart
     clamp: str = "reference"
     line: Any = None  # a catalogue name or a diameter, checked where the clamp is loaded
@@ -159,8 +154,6 @@ class FileTable(PartTable, kw_only=True):
 class MeshTable(FileTable, kw_only=True):
     """``shape = "mesh"``: a file of one body, in its own frame; see `MeshShape` for ``fit``."""
 
-    shape: Literal["mesh"]
-
     def read(self, folder: Path) -> Scene:
         """The part, not yet moved or renamed."""
         scene = super().read(folder)
@@ -186,9 +179,10 @@ SHAPES: dict[str, type[AnyTable]] = {
 
 def part_table(data: Any, origin: str, key: str) -> AnyTable:
     """The table of a part, by its ``shape`` or as a file. Raises InputError."""
-    shape = data.get("shape") if isinstance(data, dict) else None
+    keys = data if isinstance(data, dict) else {}
+    shape = keys.get("shape")
     kind: type[AnyTable] | None = SHAPES.get(shape) if isinstance(shape, str) else None
-    if isinstance(data, dict) and "file" in data and "shape" not in data:
+    if "file" in keys and "shape" not in keys:
         kind = FileTable
     if kind is None:
         choices = ", ".join(f'"{name}"' for name in SHAPES)
@@ -198,7 +192,7 @@ def part_table(data: Any, origin: str, key: str) -> AnyTable:
             + (f", got {checks.shown(shape)}" if shape is not None else "")
             + (f"; did you mean {near[0]}?" if near else "")
         )
-    table: AnyTable = validate(kind, data, origin, key)
+    table: AnyTable = validate(kind, {name: value for name, value in keys.items() if name != "shape"}, origin, key)
     return table
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.motions import MotionDistance
 from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, translation
 from clamp3d.testing.bodies import AnyBody, Body, body
 from clamp3d.testing.search import Common, common, nearest
 
@@ -73,23 +73,17 @@ def assert_distance(
     if answer.upper < -tolerance:
         ways = directions(_WAYS) if n is None else np.vstack([n, directions(_WAYS)])
         for way in ways:
-            kept = common(x, _moved(y, -0.999 * answer.upper * way), cells=cells // 10)
+            kept = common(x, y.at(translation(*(-0.999 * answer.upper * way))), cells=cells // 10)
             assert kept.lower <= 0.0, f"parted by less than {-answer.upper} mm along {way}"
     if n is not None and math.isfinite(answer.lower):
         assert abs(float(np.linalg.norm(n)) - 1.0) <= 1e-9, "the normal is no unit vector"
-        closed = common(x, _moved(y, -answer.lower * n), cells=cells).upper
+        closed = common(x, y.at(translation(*(-answer.lower * n))), cells=cells).upper
         assert closed >= -0.5 * tolerance, f"moved by {-answer.lower} along the normal they overlap by {-2.0 * closed}"
 
 
 def _deepest(x: Body, y: Body, answer: Common, cells: int) -> float:
     """The least field found in both: where a search has not ended a coarser one, which comes further, looks again."""
     return answer.upper if answer.ended else min(answer.upper, common(x, y, cells=cells).upper)
-
-
-def _moved(it: Body, by: Array) -> Body:
-    T = np.eye(4)
-    T[:3, 3] = by
-    return it.at(T)
 
 
 def pose_at(motion: Motion, t: float, start: Array) -> Array:
