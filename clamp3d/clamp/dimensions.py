@@ -7,9 +7,8 @@ Section frame of the paper: x right, y down, so "depth" and "below" are along +y
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias, cast
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta
@@ -299,9 +298,8 @@ class Clamp:
 
     def connection(self, a: PartName, b: PartName) -> ConnectionType:
         """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""
-        rows = cast(Mapping[str, Mapping[str, ConnectionType]], self.connections)
-        first, second = sorted((a, b))
-        return rows.get(first, {}).get(second, 0)
+        entries = ((first, *entry) for first, row in self.connections.items() for entry in row.items())
+        return next((kind for first, second, kind in entries if {first, second} == {a, b}), 0)
 
     def __post_init__(self) -> None:
         down = self.down_splint
