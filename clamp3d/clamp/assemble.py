@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from clamp3d.baselines.cas import Cas
@@ -25,7 +24,7 @@ from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import HELD, B, D, S, Section, W
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
-from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
+from clamp3d.clamp.stepped import SteppedState, solve_stepped
 from clamp3d.errors import SolverError
 
 STEP, TILT_STEP = 1.0 / 3.0, math.radians(1.0)
@@ -103,8 +102,8 @@ def assemble(
     if solver == "exact":
         final, closing = _close(section)
     else:
-        solve = solve_stepped if solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
-        final = solve(section, step=step, tilt_step=tilt_step, progress=progress)
+        until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
+        final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
         closing = Closing(open_start(section), final.q, final.q, [], [])
     return _assembled(log, steps, closing, final, solver, resolution, others)
 
