@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, open_up, solve_final_state
 from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, S, Section, U
@@ -69,7 +68,6 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     >>> [round(section.splint_distance(state.q), 3) for state in equilibria(section)]
     [31.638, 31.53]
     """
-    instance("section", section, Section)
     states: list[FinalState] = []
     last: SolverError | None = None
     for start in initial_guesses(section):

@@ -284,8 +284,7 @@ def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array)
     """Least second derivative of the Lagrangian by unit motions of the critical cone.
 
     The critical cone keeps the strongly active gaps (multiplier > 0) closed and lets no weakly active one (closed to
-    `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here (a plane is looked at degree by degree);
-    more are looked at by random directions.
+    `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here, and is looked at in random directions.
     """
     strong = np.flatnonzero(multipliers)
     free = _touched(section, gaps, strong)
@@ -300,11 +299,7 @@ def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array)
     weak = np.flatnonzero((np.abs(gaps.value) <= TOLERANCE) & (multipliers == 0.0))
     if least >= -LEVEL or not len(weak):
         return least
-    if len(tangent) <= 2:
-        angle = np.linspace(0.0, 2.0 * np.pi, 721)
-        motions = np.column_stack([np.cos(angle), np.sin(angle)])[:, : len(tangent)]
-    else:
-        motions = np.random.default_rng(0).normal(size=(20_000, len(tangent)))
+    motions = np.random.default_rng(0).normal(size=(20_000, len(tangent)))
     motions /= np.maximum(np.linalg.norm(motions, axis=1), 1e-9)[:, None]
     opens = gaps.gradient[np.ix_(weak, free)] @ tangent.T @ motions.T
     motions = motions[(opens >= -1e-7).all(axis=0)]

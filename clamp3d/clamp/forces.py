@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import Section
 from clamp3d.geometry.pose import Array
 
@@ -43,10 +42,6 @@ class Force:
     force: float
     point: Array
     direction: Array
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self)
 
 
 def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:

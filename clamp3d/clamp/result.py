@@ -72,10 +72,6 @@ class Start:
     line: tuple[float, float]
     jumper: tuple[float, float]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self, closing="closing_mm", tilt="tilt_deg")
-
 
 @dataclass(frozen=True, slots=True)
 class Work:
@@ -116,10 +112,6 @@ class Equilibrium:
         if self.is_equilibrium:
             return f"another equilibrium: {where}" + (f": {self.detail}" if self.detail else "")
         return f"also ends at {where} (no equilibrium: {self.detail})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,6 +303,7 @@ class Assembly:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, as ``clamp3d run --json`` writes it; lengths in mm, angles in degrees."""
+        keys = {"distance": "distance_mm", "closing": "closing_mm", "tilt": "tilt_deg", "is_equilibrium": "rests"}
         return {
             "clamp3d": __version__,
             "clamp": self.clamp.name,
@@ -341,9 +334,9 @@ class Assembly:
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
             "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
-            "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
-            "start": self.start.to_dict(),
-            "forces": [f.to_dict() for f in self.forces],
+            "other_ends": None if self.others is None else [plain(e, **keys) for e in self.others],
+            "start": plain(self.start, **keys),
+            "forces": [plain(force) for force in self.forces],
             "with_play_mm": None
             if self.with_play is None
             else {", ".join(p.joints): p.distance for p in self.with_play},
