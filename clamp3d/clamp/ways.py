@@ -26,7 +26,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.result import NOT_CLEAN, PairResult
 from clamp3d.engine.scene import Part, Scene
-from clamp3d.errors import SequenceError, SolverError
+from clamp3d.errors import SequenceError
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Solid
@@ -53,7 +53,6 @@ _SAMPLES = (0.5, 0.25, 0.125, 0.0625, 0.03125)
 _SHORTEST = 0.5
 """Shortest leg of a way with a bend, mm; chosen."""
 _HERE = np.zeros(3)
-_ROUNDS = 1000  # parts that are still in each other's way push each other round in a circle
 Offsets = Mapping[PartName, Array]
 """How far parts that wait are from where the section has them, (3,) mm of the world."""
 
@@ -303,45 +302,24 @@ class Plan:
         )
 
     def _spread(self) -> None:
-        """Move what waits out of the way of what moves before it: it waits further out on its own way."""
-        for _ in range(_ROUNDS):
-            conflict = next(self._conflicts(), None)
-            if conflict is None:
-                return
-            step, length = conflict
-            *legs, (origin, last) = self.legs[step]
-            self.legs[step] = (*legs, (origin, last + length))
-        raise SolverError(f"no places found where the parts of {' -> '.join(map(str, self.steps))} can wait apart")
+        """What waits where something comes near it before its own step waits further out on its own way."""
+        for later, step in enumerate(self.steps):
+            while step.kind == "bring" and (length := self._lacking(later)):
+                *legs, (origin, last) = self.legs[later]
+                self.legs[later] = (*legs, (origin, last + length))
 
-    def _conflicts(self) -> Iterator[tuple[int, float]]:
-        """Steps that must bring their parts from further away, and by how much, mm."""
-        for k, step in enumerate(self.steps):
-            boxes = self._swept(k)
-            for a, b in itertools.permutations(PARTS, 2):
-                later = self._parting(a, b, k)
-                moves = a < b if step.kind != "bring" else a in step.parts and b not in step.parts
-                if later is None or not moves:
-                    continue
-                (low, high), (other_low, other_high) = boxes[a], boxes[b]
-                if max((low - other_high).max(), (other_low - high).max()) >= 0.5 * SPARE:
-                    continue
-                direction = np.array(DIRECTIONS[self.legs[later][-1][0]])
-                axis = int(np.argmax(np.abs(direction)))
-                # Whichever of the two that step brings goes further out.
-                is_up = (direction.sum() > 0.0) == (b in self.steps[later].parts)
-                yield later, float(high[axis] - other_low[axis] if is_up else other_high[axis] - low[axis]) + SPARE
+    def _lacking(self, later: int) -> float:
+        """How much further out the parts that a step brings must wait than they do, mm."""
+        moving, direction, lengths = self.steps[later].parts, out(self.legs[later][-1][0]), [0.0]
+        for k, a, b in itertools.product(range(later), moving, PARTS):
+            if b not in moving and self._parting(a, b, k) == later:
+                (low, high), (other_low, other_high) = own, other = self._swept(k, a), self._swept(k, b)
+                if max((low - other_high).max(), (other_low - high).max()) < 0.5 * SPARE:
+                    lengths.append(float((other @ direction).max() - (own @ direction).min()) + SPARE)
+        return max(lengths)
 
-    def _swept(self, k: int) -> dict[PartName, Array]:
-        """Boxes (2, 3) around the parts' ways in step k; the bend of a way is a corner of the box around its ends."""
-        before, after = self.offsets(k), self.offsets(k + 1)
-        swept = {}
-        for name in PARTS:
-            ends = np.array([self._boxes[j][name] + way[name] for j in (k, k + 1) for way in (before, after)])
-            swept[name] = np.array([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)])
-        return swept
-
-    @cached_property
-    def _boxes(self) -> list[dict[PartName, Array]]:
-        """The box (2, 3) around each part at each of the bases."""
-        solids = parts(self.clamp)
-        return [{name: solids[name].bounds_at(pose.T()) for name, pose in base.items()} for base in self.bases]
+    def _swept(self, k: int, name: PartName) -> Array:
+        """Box (2, 3) around a part's way in step k; the bend of a way is a corner of the box around its ends."""
+        solid, ways = parts(self.clamp)[name], (self.offsets(k)[name], self.offsets(k + 1)[name])
+        ends = np.array([solid.bounds_at(self.bases[j][name].T()) + way for j in (k, k + 1) for way in ways])
+        return np.array([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)])
