@@ -47,8 +47,3 @@ def _pose(R: Array, u: float, v: float) -> Array:
     T[:3, :3] = R
     T[:3, 3] = (u, 0.0, -v)
     return T
-
-
-def wire_pairs(clamp: Clamp) -> list[GroovePair]:
-    """The four pairs of a splint's groove and a wire."""
-    return [pair for pair in groove_pairs(clamp).values() if pair.b in ("P6", "P7")]

@@ -16,7 +16,7 @@ from clamp3d.clamp.matrix import Difference, Pair, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.engine.scene import Scene
-from clamp3d.errors import need
+from clamp3d.errors import InputError, need
 from clamp3d.geometry.pose import Array, SectionPose
 
 Solver = Literal["exact", "stepped", "bisection"]
@@ -243,6 +243,19 @@ class Assembly:
     def scene(self) -> Scene:
         """The final state as a scene: everything that works on scenes works on it."""
         return clamp_scene(self.clamp, {part: self.T_world(part) for part in self.poses})
+
+    def waypoint(self, state: str) -> Waypoint:
+        """The waypoint of a state: ``open`` is where the run begins, a step is where it ends, ``final`` the run's end.
+
+        A step is named as in the sequence or by its number. Raises InputError for any other name, with the choices.
+        """
+        ends = {waypoint.step: waypoint for waypoint in self.path}
+        numbered = {str(i): end for i, end in enumerate(ends.values(), 1)}
+        states = {"open": self.path[0]} | ends | numbered | {"final": self.path[-1]}
+        if state not in states:
+            steps = ", ".join(f"{step} (or {i})" for i, step in enumerate(ends, 1))
+            raise InputError(f"unknown state {state!r}; available: open, {steps}, final")
+        return states[state]
 
     def scene_at(self, waypoint: Waypoint) -> Scene:
         """The parts at a waypoint of `path` as a scene."""
