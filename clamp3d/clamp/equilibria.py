@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -119,7 +118,7 @@ def initial_guesses(section: Section) -> list[Array]:
     tilts = np.linspace(-limit, limit, _TILTS)
     lifted = section.clamp.lifted(tilts)
     faces = [-section.face_gap(lever * tilt * np.eye(SIZE)[S]) for tilt in tilts]  # least d without an overlap
-    line, jumper = (_Landscape.of(section, i, tilts) for i in range(len(WIRES)))
+    line, jumper = (_Landscape(section, i, tilts) for i in range(len(WIRES)))
 
     def height(k: int, a: int, b: int) -> float:
         return float(max(faces[k], line.least[k][a], jumper.least[k][b]) + lifted[k])
@@ -139,7 +138,6 @@ def initial_guesses(section: Section) -> list[Array]:
     return [opened for q in guesses if (opened := open_up(section, q, step)) is not None]
 
 
-@dataclass(frozen=True)
 class _Landscape:
     """How close a wire lets the splints come: ``least`` (t, n) mm at all tilts and positions ``x`` (n,).
 
@@ -147,27 +145,20 @@ class _Landscape:
     position ``outside`` leaves the clamp.
     """
 
-    x: Array
-    over: Array
-    under: Array
-    least: list[list[float]]
-    outside: int
-
-    @classmethod
-    def of(cls, section: Section, i: int, tilts: Array) -> _Landscape:
+    def __init__(self, section: Section, i: int, tilts: Array) -> None:
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.reach(wire)
         face = section.clamp.down_splint.face_depth
-        x = np.linspace(low, high, _POSITIONS)
-        over = _curve(section, up, x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
+        self.x, self.outside = np.linspace(low, high, _POSITIONS), 0 if i == 0 else _POSITIONS - 1
+        self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
         deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
         aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
         u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
-        under = np.array([_turned(u, v, tilt, bolt, x) for tilt in tilts])
-        least = np.round((over - under) / (_LEVEL * r)) * (_LEVEL * r)
-        return cls(x, over, under, least.tolist(), 0 if i == 0 else _POSITIONS - 1)
+        self.under = np.array([_turned(u, v, tilt, bolt, self.x) for tilt in tilts])
+        least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
+        self.least: list[list[float]] = least.tolist()
 
     def minima(self, k: int) -> list[int]:
         """Positions of the local minima at tilt k, but for where the wire leaves the clamp; the first of level ones."""

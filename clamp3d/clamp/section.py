@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,6 @@ from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
 from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
 from clamp3d.geometry.pose import Array, SectionPose
-from clamp3d.kernel.contact_model import GroovePair
 
 _INDEX = {name: i for i, name in enumerate(PARTS)}
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
@@ -109,47 +108,34 @@ class Gap:
 _AT_REST = SectionPose(0.0, 0.0)
 
 
-@dataclass(eq=False)
 class Section:
     """A clamp whose grooves are measured by ``model``.
 
-    ``queries`` counts how often the model was asked about a groove and a wire: C of Table 5.
+    Attributes
+    ----------
+    queries : int
+        How often the model was asked about a groove and a wire: C of Table 5.
+    pairs : dict of GroovePair
+        The clamp's grooves with what lies in them.
+    lever : float
+        Half width of the down splint in mm: it turns the tilt into a length.
+    bolt_x : float
+        Axis of the up splint's hole from P1's left edge in mm.
+    free : tuple of int
+        The coordinates of q that move.
+    least_slack : float
+        Least difference of a wire's and its groove's radius in mm.
     """
 
-    clamp: Clamp
-    model: ContactModel
-    queries: int = field(default=0, init=False)
-
-    def __post_init__(self) -> None:
-        instance("clamp", self.clamp, Clamp)
-        check_model(self.model)
-
-    @cached_property
-    def pairs(self) -> dict[Pair, GroovePair]:
-        """The clamp's grooves with what lies in them."""
-        return groove_pairs(self.clamp)
-
-    @cached_property
-    def lever(self) -> float:
-        """Half width of the down splint in mm: it turns the tilt into a length."""
-        return self.clamp.down_splint.width / 2
-
-    @cached_property
-    def bolt_x(self) -> float:
-        """Axis of the up splint's hole from P1's left edge in mm."""
-        return self.clamp.up_splint.width / 2
-
-    @cached_property
-    def free(self) -> tuple[int, ...]:
-        """The coordinates of q that move."""
-        joints = self.clamp.joints
-        shifts = ((B, joints.hole), (V, joints.washer), (W, joints.saddle))
-        return (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
-
-    @cached_property
-    def least_slack(self) -> float:
-        """Least difference of a wire's and its groove's radius in mm."""
-        return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
+    def __init__(self, clamp: Clamp, model: ContactModel) -> None:
+        instance("clamp", clamp, Clamp)
+        check_model(model)
+        self.clamp, self.model, self.queries = clamp, model, 0
+        self.pairs = groove_pairs(clamp)
+        self.lever, self.bolt_x = clamp.down_splint.width / 2, clamp.up_splint.width / 2
+        shifts = ((B, clamp.joints.hole), (V, clamp.joints.washer), (W, clamp.joints.saddle))
+        self.free = (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
+        self.least_slack = min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
 
     @cached_property
     def _twists(self) -> Array:

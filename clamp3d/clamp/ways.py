@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,33 +96,21 @@ class Block:
         return plain(self, travel="travel_mm", way="way_mm") | {"t": self.travel / self.way}
 
 
-@dataclass(frozen=True)
 class Insertion:
     """Parts that come to their places as one: the first ones of ``pairs`` move, the second ones stand.
 
     ``place`` holds their poses (4, 4) in the world, ``cache`` keeps their models.
     """
 
-    clamp: Clamp
-    pairs: Sequence[Pair]
-    place: Mapping[PartName, Array]
-    cache: ModelCache = field(default_factory=ModelCache)
-
-    @cached_property
-    def _moving(self) -> tuple[PartName, ...]:
-        return tuple(sorted({a for a, _ in self.pairs}))
-
-    @cached_property
-    def _solids(self) -> dict[PartName, Solid]:
-        """The clamp's parts, wires as good as endless."""
-        length, wires = _ENDLESS * self.clamp.wire_length, (self.clamp.line, self.clamp.jumper)
-        endless = {name: wire_solid(name, wire.radius, length) for name, wire in zip(WIRES, wires, strict=True)}
-        return parts(self.clamp) | endless
-
-    @property
-    def _farthest(self) -> float:
-        """The longest way, mm: a longer one would lead over a wire's end."""
-        return 0.5 * (_ENDLESS - 2.0) * self.clamp.wire_length
+    def __init__(
+        self, clamp: Clamp, pairs: Sequence[Pair], place: Mapping[PartName, Array], cache: ModelCache | None = None
+    ) -> None:
+        self.clamp, self.pairs, self.place, self.cache = clamp, pairs, place, cache or ModelCache()
+        self._moving, self._standing = (tuple(sorted({pair[k] for pair in pairs})) for k in (0, 1))
+        length = _ENDLESS * clamp.wire_length
+        self._farthest = 0.5 * (length - 2.0 * clamp.wire_length)  # a longer way would lead over a wire's end
+        wires = zip(WIRES, (clamp.line, clamp.jumper), strict=True)
+        self._solids = parts(clamp) | {name: wire_solid(name, wire.radius, length) for name, wire in wires}
 
     def way_out(self) -> tuple[Leg, ...]:
         """The first free way; empty if there is none, and `blocks` says why."""
@@ -166,17 +153,15 @@ class Insertion:
 
     def _exits(self, start: Array) -> Iterator[Leg]:
         """Directions that lead out, each with how far until the moving parts' common box leaves that of the others."""
-        standing = sorted({b for _, b in self.pairs})
         for origin in DIRECTIONS:
-            length = self._length(start, origin, standing)
+            length = self._length(start, origin, self._standing)
             if length <= self._farthest:
                 yield origin, length
 
     def _bends(self) -> Iterator[Leg]:
         """First legs: along the wires past all that is no wire, else a part of how far the parts can go."""
-        standing = sorted({b for _, b in self.pairs})
         for origin, (_, along, _) in DIRECTIONS.items():
-            others = [name for name in standing if name not in WIRES] if along else standing
+            others = [name for name in self._standing if not (along and name in WIRES)]
             length = self._length(_HERE, origin, others, beside=True) + SPARE
             if length > self._farthest:
                 continue
