@@ -21,7 +21,7 @@ from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.play import Closing, Log, Meetings, meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import HELD, B, D, S, Section, W
+from clamp3d.clamp.section import HELD, D, S, Section
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_stepped
@@ -104,7 +104,7 @@ def assemble(
     else:
         until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
         final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
-        closing = Closing(open_start(section), final.q, final.q, [], [])
+        closing = Closing(open_start(section), final.q, final.q, [])
     return _assembled(log, steps, closing, final, solver, resolution, others)
 
 
@@ -155,9 +155,7 @@ def _close(section: Section) -> tuple[FinalState, Closing]:
     met: Meetings = []
     final = solve_final_state(section, on_contact=lambda pair, q: met.append((pair, q)))
     met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
-    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-    return final, Closing(final.start, final.held, final.q, by_hand, taken)
+    return final, Closing(final.start, final.held, final.q, met)
 
 
 def _add_silent_contacts(
@@ -183,9 +181,9 @@ def _with_play(section: Section, final: FinalState) -> tuple[Play, ...]:
             end = solve_final_state(free, final.q)
         except SolverError as error:
             ends.append(Play(joints, f"not proven: {error}", None))
-            continue
-        status = closing_status(free, end)
-        ends.append(Play(joints, status.text, free.splint_distance(end.q) if status.clamped else None))
+        else:
+            status = closing_status(free, end)
+            ends.append(Play(joints, status.text, free.splint_distance(end.q) if status.clamped else None))
     return tuple(ends)
 
 

@@ -100,13 +100,13 @@ def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:
     words = []
     for wire in WIRES:
         on = {pair[0]: feature for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)}
-        kinds = {
-            p: f"{'the face' if name.startswith('flat') else 'a lip'} of the {TITLES[p]}" for p, name in on.items()
-        }
         if wire in slipped:
             words.append(f"{TITLES[wire]} slips out of its groove")
-        elif kinds:
-            words.append(f"{TITLES[wire]} on {' and '.join(kinds.values())}")
+        elif on:
+            kinds = {part: "the face" if feature.startswith("flat") else "a lip" for part, feature in on.items()}
+            words.append(
+                f"{TITLES[wire]} on " + " and ".join(f"{kind} of the {TITLES[part]}" for part, kind in kinds.items())
+            )
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
     return ", ".join([*words, *stop_words(state.active)])

@@ -15,7 +15,7 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import D, Section
+from clamp3d.clamp.section import B, D, Section, W
 from clamp3d.clamp.sequence import Step, as_published
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, Offsets, Plan, corners
 from clamp3d.engine.check import check
@@ -32,14 +32,12 @@ Meetings = list[tuple[Pair, Array]]
 
 @dataclass(frozen=True)
 class Closing:
-    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way, by
-    hand and where the nut takes up the joints' play."""
+    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way."""
 
     start: Array
     held: Array
     end: Array
-    by_hand: Meetings
-    taken: Meetings
+    met: Meetings
 
 
 @dataclass
@@ -165,12 +163,17 @@ def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
 def _close_splints(step: str, closing: Closing, log: Log) -> None:
     """The down splint closes by hand, the saddle left where it was; what waits apart it does not meet."""
     section, d = log.section, float(closing.start[D])
-    for pair, q in closing.by_hand:
-        if not any(np.any(log.aside.get(name, 0.0)) for name in pair):
+    for pair, q in closing.met:
+        if _is_by_hand(q) and not any(np.any(log.aside.get(name, 0.0)) for name in pair):
             poses = section.poses(q, saddle_d=d)
             log.reach(step, _meeting(pair), poses)
             log.touch(step, [pair], section.poses(q), d - float(q[D]))
     log.reach(step, "splints closed", section.poses(closing.held, saddle_d=d))
+
+
+def _is_by_hand(q: Array) -> bool:
+    """Whether a state is of the closing by hand: the nut has not begun to take up the joints' play."""
+    return not q[B : W + 1].any()
 
 
 def _meeting(pair: Pair) -> str:
@@ -184,13 +187,12 @@ def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
 
     If the down splint has not been closed by hand, the saddle takes it along. Returns the way that the nut has gone.
     """
-    section, d, seated, met = log.section, float(closing.start[D]), closing.held, closing.taken
-    if "P2" in step.parts:
-        seated, met = closing.end, closing.by_hand + closing.taken
-    elif not np.array_equal(seated, closing.end):
+    section, d, takes_along = log.section, float(closing.start[D]), "P2" in step.parts
+    seated = closing.end if takes_along else closing.held
+    if not np.array_equal(seated, closing.end):
         log.reach(step.name, "saddle meets the down splint", section.poses(seated))
-    for pair, q in met:
-        if "P2" in step.parts:
+    for pair, q in [(pair, q) for pair, q in closing.met if takes_along or not _is_by_hand(q)]:
+        if takes_along:
             log.reach(step.name, _meeting(pair), section.poses(q))
         log.touch(step.name, [pair], section.poses(q), d - float(q[D]))
     end, travel = section.poses(closing.end), d - float(closing.end[D])

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -136,9 +135,9 @@ class Section:
         shifts = ((B, clamp.joints.hole), (V, clamp.joints.washer), (W, clamp.joints.saddle))
         self.free = (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
         self.least_slack = min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
+        self._twists = self._part_twists()
 
-    @cached_property
-    def _twists(self) -> Array:
+    def _part_twists(self) -> Array:
         """How the parts (7,) move right and down (mm) and turn (rad) with q and the turns of both wires over their
         radius: (7, 3, 12)."""
         twist = np.zeros((len(PARTS), 3, SIZE + len(WIRES)))
