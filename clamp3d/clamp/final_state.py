@@ -12,7 +12,6 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from clamp3d.baselines.cas import Cas
@@ -249,24 +248,17 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
     return multipliers
 
 
-def _touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The free coordinates that any of the gaps ``rows`` depends on."""
-    free = np.array(section.free)
-    return np.asarray(free[np.abs(gaps.gradient[np.ix_(rows, free)]).max(axis=0, initial=0.0) > 0.0])
-
-
 def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
     """Newton's method on stationarity and the active gaps together; returns the state and its last step in mm.
 
     A gap that a step has closed too far joins the active set.
     """
-    step = np.inf
+    step, free = np.inf, np.array(section.free)
     for _ in range(20):
         gaps = section.gaps(q)
         multipliers = _multipliers(section, gaps, active)
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
-        free = _touched(section, gaps, rows)
         A, k, n = gaps.gradient[rows], len(rows), len(free)
         hessian = -section.hessian(q, gaps, multipliers)[np.ix_(free, free)]
         kkt = np.block([[hessian, -A[:, free].T], [A[:, free], np.zeros((k, k))]])
@@ -286,8 +278,8 @@ def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array)
     The critical cone keeps the strongly active gaps (multiplier > 0) closed and lets no weakly active one (closed to
     `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here, and is looked at in random directions.
     """
-    strong = np.flatnonzero(multipliers)
-    free = _touched(section, gaps, strong)
+    strong, free = np.flatnonzero(multipliers), np.array(section.free)
+    free = free[gaps.gradient[np.ix_(strong, free)].any(axis=0)]  # what is neither held nor driven is level
     if not len(free):
         return np.inf
     _, sizes, rows = np.linalg.svd(gaps.gradient[np.ix_(strong, free)])

@@ -26,8 +26,8 @@ from clamp3d.checks import choice, function, number, positive, whole
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.closing import descend, open_start
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.parts import groove_pairs
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.section import SIZE, WIRES, Section
 from clamp3d.clamp.status import closing_status

@@ -12,17 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from clamp3d.checks import number
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.forces import HELD, Force
 from clamp3d.clamp.matrix import plain
+from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.section import WIRES
 from clamp3d.errors import InputError
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.result import Assembly
 
 THREAD_FRICTION = (0.10, 0.14, 0.20)
 """Friction of thread and nut face. Chosen from classes B and C of VDI 2230, table A5 (0.08 to 0.16, 0.14 to 0.24)."""
