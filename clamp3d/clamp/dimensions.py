@@ -7,7 +7,6 @@ Section frame of the paper: x right, y down, so "depth" and "below" are along +y
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
@@ -43,7 +42,6 @@ TITLES: dict[PartName, str] = {
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Wire:
     """A conductor, by catalogue name or by ``diameter``; exactly one of the two. Raises InputError if it is unknown."""
 
@@ -67,7 +65,6 @@ class Wire:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class GrooveDimensions:
     """A groove's arc: its centre lies ``offset`` beside the bolt axis and ``centre_depth`` below the part's origin."""
 
@@ -77,7 +74,6 @@ class GrooveDimensions:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UpSplint:
     """P1: a plate with its two grooves underneath. Origin: its top left corner."""
 
@@ -101,7 +97,6 @@ class UpSplint:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DownSplint:
     """P2: grooves on top, a round back that tilts in the saddle. Origin: centre of the round back."""
 
@@ -151,7 +146,6 @@ class DownSplint:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Saddle:
     """P3: saddle washer under the round back. Origin: centre of its concave arc."""
 
@@ -173,7 +167,6 @@ class Saddle:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Bolt:
     """P4: hexagon bolt, head below the saddle. Origin: its free (upper) end."""
 
@@ -194,7 +187,6 @@ class Bolt:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Nut:
     """P5: hexagon nut and washers together, on the up splint. Origin: its free (upper) face."""
 
@@ -203,7 +195,6 @@ class Nut:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Joints:
     """Whether parts use their sideways play: the bolt in the up splint's ``hole``, the down splint's round back in the
     ``saddle``, the saddle ``washer`` on the bolt. The paper holds the down splint on the bolt's axis: none of it."""
@@ -214,7 +205,6 @@ class Joints:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """What a tightening is measured by, where it is given: the most ``bolt_force`` in N, the most ``line_load`` on a
     wire in N/mm, and the ``wire_pull`` in N that each wire must hold lengthwise."""
@@ -225,7 +215,6 @@ class Limits:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
 
