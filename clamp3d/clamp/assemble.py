@@ -15,7 +15,6 @@ from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.play import Closing, Log, Meetings, meetings, play
@@ -144,7 +143,7 @@ def _assembled(
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
         start=Start(float(q[D]), 0.0, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
-        forces=contact_forces(section, proven) if proven else (),
+        forces=proven.forces(section) if proven else (),
         others=_others(section, proven) if proven and others else None,
         with_play=_with_play(section, proven) if proven and others else None,
     )

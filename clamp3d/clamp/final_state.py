@@ -17,6 +17,8 @@ from scipy.optimize import nnls
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.forces import HELD as HELD_ON_AXIS
+from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import HELD, SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.clamp.status import ClosingStatus, closing_status
@@ -95,6 +97,24 @@ class FinalState:
     def is_proven(self) -> bool:
         """Feasible, stationary, and no saddle."""
         return self.residual <= TOLERANCE and self.curvature >= -LEVEL
+
+    def forces(self, section: Section) -> tuple[Force, ...]:
+        """The contact forces that hold the state, those on the wires first: the multipliers of its active gaps.
+
+        >>> from clamp3d.clamp.loader import load_clamp
+        >>> section = Section(load_clamp(), Cas())
+        >>> [(f.a, f.b, round(f.force, 3)) for f in solve_final_state(section).forces(section)][:2]
+        [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
+        """
+        q, gaps, forces, total = self.q, self.gaps, [], 0.0
+        for k in np.flatnonzero(self.multipliers):
+            (a, b), push = gaps.pair[k], self.multipliers[k] * gaps.normal[k]
+            forces.append(world_force(q, a, b, gaps.feature[k], push, gaps.point[k]))
+            total += float(push[0]) * ((b == "P2") - (a == "P2"))
+        if not section.clamp.joints.saddle and abs(total) > 1e-9:
+            down = section.down_splint(q)
+            forces.append(world_force(q, "P4", "P2", HELD_ON_AXIS, np.array([-total, 0.0]), (down.x, down.y)))
+        return tuple(forces)
 
 
 def solve_final_state(
