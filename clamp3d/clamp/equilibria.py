@@ -186,12 +186,10 @@ def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: flo
     """How deep (n,) a wire's centre gets into a groove at positions u (n,), from depth ``start`` in sense ``sign``."""
     T = np.tile(np.eye(4), (len(u), 1, 1))
     T[:, 0, 3], T[:, 2, 3] = u, -start
-    moving = np.arange(len(u))
     for _ in range(_ADVANCES):
-        way = section.model.distances(pair, T[moving])
-        T[moving, 2, 3] -= sign * np.maximum(way, 0.0)
-        moving = moving[way > 1e-5 * pair.cylinder.radius]
-        if not len(moving):
+        way = section.model.distances(pair, T)
+        T[:, 2, 3] -= sign * np.maximum(way, 0.0)
+        if way.max() <= 1e-5 * pair.cylinder.radius:
             break
     return -T[:, 2, 3]
 
