@@ -25,6 +25,7 @@ from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_stepped
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
 
 STEP, TILT_STEP = 1.0 / 3.0, math.radians(1.0)
 """Move along the bolt (mm) and turn (rad) of the paper's program, derived from its Table 4."""
@@ -96,14 +97,14 @@ def assemble(
         clamp = replace(clamp, sequence=text("sequence", sequence))
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
-    log = Log(section, on_waypoint)
+    log, start = Log(section, on_waypoint), open_start(section)
     final: FinalState | SteppedState
     if solver == "exact":
-        final, closing = _close(section)
+        final, closing = _close(section, start)
     else:
         until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
         final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
-        closing = Closing(open_start(section), final.q, final.q, [])
+        closing = Closing(start, final.q, final.q, [])
     return _assembled(log, steps, closing, final, solver, resolution, others)
 
 
@@ -149,12 +150,12 @@ def _assembled(
     )
 
 
-def _close(section: Section) -> tuple[FinalState, Closing]:
+def _close(section: Section, start: Array) -> tuple[FinalState, Closing]:
     """The proven final state and how the closing came there."""
     met: Meetings = []
-    final = solve_final_state(section, on_contact=lambda pair, q: met.append((pair, q)))
+    final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
     met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    return final, Closing(final.start, final.held, final.q, met)
+    return final, Closing(start, final.held, final.q, met)
 
 
 def _add_silent_contacts(

@@ -53,8 +53,6 @@ class FinalState:
     ----------
     q : ndarray (10,)
         The state as in `section`.
-    start : ndarray (10,)
-        Where its closing began.
     held : ndarray (10,)
         Where the path was when the down splint, closed by hand, came to rest: before the nut takes up the joints' play.
     gaps : Gaps
@@ -74,7 +72,6 @@ class FinalState:
     """
 
     q: Array
-    start: Array
     held: Array
     gaps: Gaps
     multipliers: Array
@@ -148,13 +145,13 @@ def solve_final_state(
     held = end = descend(section, start, free=HELD, stride=stride, on_contact=on_contact)
     if section.free != HELD:
         end = descend(section, held, stride=stride, on_contact=on_contact)
-    final = _best(section, end, start, held)
+    final = _best(section, end, held)
     for attempt in range(_ATTEMPTS):
         if final.is_proven:
             return final
         # Degenerate active set or saddle point: let it slide off, or restart from a perturbed, slightly opened state.
         q = end if attempt == 0 else _perturb(section, final.q, attempt)
-        again = _best(section, descend(section, q, stride=stride, at_rest=STILL), start, held)
+        again = _best(section, descend(section, q, stride=stride, at_rest=STILL), held)
         if again.is_proven or again.residual < final.residual:
             final = again
     if final.is_proven:
@@ -188,17 +185,17 @@ def open_up(section: Section, q: Array, step: float) -> Array | None:
     return None
 
 
-def _best(section: Section, q: Array, start: Array, held: Array) -> FinalState:
+def _best(section: Section, q: Array, held: Array) -> FinalState:
     """The state at the end of a path, with the active set that proves it best."""
     states: list[FinalState] = []
     for active in _ACTIVE_TRIES:
-        states.append(_certify(section, q, start, held, active))
+        states.append(_certify(section, q, held, active))
         if states[-1].residual <= TOLERANCE:
             break
     return min(states, key=lambda state: state.residual)
 
 
-def _certify(section: Section, q: Array, start: Array, held: Array, active: float) -> FinalState:
+def _certify(section: Section, q: Array, held: Array, active: float) -> FinalState:
     """Polish a state whose active set are the gaps within ``active`` mm, settle loose wires, and measure the proof."""
     q, step = _polish(section, q, active)
     gaps = section.gaps(q)
@@ -216,7 +213,6 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
     complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
     return FinalState(
         q=q,
-        start=start,
         held=q if section.free == HELD else held,  # nothing moves while the nut turns
         gaps=gaps,
         multipliers=multipliers,

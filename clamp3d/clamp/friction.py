@@ -229,8 +229,7 @@ class FrictionBand:
             d, valid = self._states(tilt, share, friction)
             score = np.where(valid, sense * self._splint_distance(d, tilt[:, None]), np.inf)
             i, j = divmod(int(score.argmin()), len(share))
-            if score[i, j] < best[0]:
-                best = float(score[i, j]), float(d[i, j]), float(tilt[i])
+            best = min(best, (float(score[i, j]), float(d[i, j]), float(tilt[i])))
             low, high = max(i - _BESIDE, 0), min(i + _BESIDE, len(tilt) - 1)
             tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
             tilt.sort()

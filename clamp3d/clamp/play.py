@@ -25,7 +25,6 @@ from clamp3d.engine.verdict import Verdict
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, SectionPose, inverse
 
-_SCREW: frozenset[str] = frozenset(("P4", "P5"))
 Meetings = list[tuple[Pair, Array]]
 """Pairs of parts, each with the state (10,) in which they meet."""
 
@@ -113,7 +112,7 @@ def _bring(plan: Plan, k: int, log: Log) -> None:
     pairs, (origin, length) = plan.meeting_pairs(k), legs[0]
     stops = [(corners(legs)[0], f"{step.part} before its place, {legs[1][0]}")] if legs[1:] else []
     engaged = base["P5"].y + plan.clamp.nut.height - base["P4"].y
-    if any(set(pair) == _SCREW for pair in pairs) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
+    if any(set(pair) == {"P4", "P5"} for pair in pairs) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
         stops.append((corners([(origin, engaged)])[0], "nut on the bolt's end"))
     for corner, label in stops:
         log.aside = {**before, **{name: end[name] + corner for name in step.parts}}
