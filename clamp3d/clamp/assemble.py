@@ -17,13 +17,14 @@ from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
-from clamp3d.clamp.play import Closing, Log, Meetings, meetings, play
+from clamp3d.clamp.play import Log, meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import HELD, D, S, Section
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_stepped
+from clamp3d.clamp.ways import Closing, Meetings
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array
 

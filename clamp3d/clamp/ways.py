@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clamp3d.clamp.contact import Poses
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.parts import parts, wire_solid
-from clamp3d.clamp.section import WIRES
+from clamp3d.clamp.section import WIRES, D, Section
 from clamp3d.clamp.sequence import Step
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.allowed import Allowed
@@ -54,6 +53,9 @@ _SHORTEST = 0.5
 _HERE = np.zeros(3)
 Offsets = Mapping[PartName, Array]
 """How far parts that wait are from where the section has them, (3,) mm of the world."""
+
+Meetings = list[tuple[Pair, Array]]
+"""Pairs of parts, each with the state (10,) in which they meet."""
 
 Leg = tuple[str, float]
 """Where the parts come from (`DIRECTIONS`), and how far, mm; a way out is its legs from the place."""
@@ -229,19 +231,41 @@ def corners(legs: Sequence[Leg]) -> list[Array]:
     return list(np.cumsum([out(*leg) for leg in legs], axis=0))
 
 
+@dataclass(frozen=True)
+class Closing:
+    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way."""
+
+    start: Array
+    held: Array
+    end: Array
+    met: Meetings
+
+
 class Plan:
     """The ways of all ``steps``, and where each part stands before each step.
 
-    ``bases`` are the poses before each step and after the last, of parts that do not wait; ``rise`` (mm) is how far the
-    nut draws the bolt up. Raises SequenceError for a step that no way leads to.
+    The ways are searched for unless they are ``published``. ``bases`` are the poses before each step and after the
+    last, of parts that do not wait. Raises SequenceError for a step that no way leads to.
     """
 
     def __init__(
-        self, clamp: Clamp, steps: Sequence[Step], bases: Sequence[Poses], rise: float, cache: ModelCache
+        self,
+        section: Section,
+        steps: Sequence[Step],
+        closing: Closing,
+        cache: ModelCache,
+        published: list[tuple[Leg, ...]] | None = None,
     ) -> None:
-        self.clamp, self.steps, self.bases, self._cache = clamp, steps, bases, cache
-        self.legs = [self._way(k, rise) for k in range(len(steps))]
-        self._spread()
+        self.clamp, self.steps, self._cache, self.is_published = section.clamp, steps, cache, published is not None
+        start, end = section.poses(closing.start), section.poses(closing.end)
+        held = section.poses(closing.held, saddle_d=float(closing.start[D]))
+        self.bases = [start]
+        for step in steps:
+            self.bases.append({"bring": self.bases[-1], "close": held, "tighten": end}[step.kind])
+        rise = float(closing.start[D] - closing.end[D])
+        self.legs = published or [self._way(k, rise) for k in range(len(steps))]
+        if not self.is_published:
+            self._spread()
 
     def offsets(self, k: int) -> Offsets:
         """How far each part is from its place before step k: by the ways of all steps that still bring it."""
@@ -263,7 +287,10 @@ class Plan:
         return next((j for j in reversed(later) if len(self.steps[j].parts & {a, b}) == 1), None)
 
     def _way(self, k: int, rise: float) -> tuple[Leg, ...]:
-        """The way out of the parts that a step brings; none for a step that closes the clamp."""
+        """The way out of the parts that a step brings; none for a step that closes the clamp.
+
+        ``rise`` (mm) is how far the nut draws the bolt up.
+        """
         step, place = self.steps[k], {name: pose.T() for name, pose in self.bases[k].items()}
         insertion = Insertion(self.clamp, self.meeting_pairs(k), place, self._cache)
         if step.kind == "bring":
