@@ -6,7 +6,7 @@ import functools
 import math
 import re
 import typing
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 
 import msgspec
 import numpy as np
@@ -27,20 +27,22 @@ _KINDS = {
 }
 
 
+@typing.dataclass_transform(kw_only_default=True, frozen_default=True)
 def checked(kind: type[T]) -> type[T]:
-    """A dataclass with keyword arguments only, which raises InputError for invalid values."""
+    """A frozen dataclass with keyword arguments only, which raises InputError for invalid values."""
 
-    cls: typing.Any = kind
+    cls: typing.Any = dataclass(frozen=True, slots=True, kw_only=True)(kind)
 
     @functools.wraps(cls.__init__)
     def init(self: T, **values: typing.Any) -> None:
         plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
-        converted = validate(kind, plain, kind.__name__)
+        converted = validate(cls, plain, cls.__name__)
         for field in fields(cls):
             object.__setattr__(self, field.name, getattr(converted, field.name))
 
     cls.__init__ = init
-    return kind
+    checked_class: type[T] = cls
+    return checked_class
 
 
 def validate(kind: typing.Any, data: typing.Any, origin: str, key: str = "", *, strict: bool = True) -> typing.Any:

@@ -13,9 +13,9 @@ from clamp3d.bench import published
 from clamp3d.bench.image import image_study
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
-from clamp3d.clamp.features import wire_pairs
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.clamp.matrix import millimetres
+from clamp3d.clamp.parts import groove_pairs
 from clamp3d.clamp.result import Assembly, Solver
 from clamp3d.engine.distance import Distance
 from clamp3d.errors import need
@@ -140,7 +140,8 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
             exact = run if solver == "exact" and unit is None else exact
             theirs = published.CAS_DISTANCE if unit is None else published.CHORD_DISTANCES[unit]
             table4.append(DistanceRow(run.method, solver, unit, run.distance, theirs))
-            segments = 4 if isinstance(model, Cas) else model.segments(wire_pairs(clamp))
+            grooves = [pair for pair in groove_pairs(clamp).values() if pair.a in ("P1", "P2")]
+            segments = 4 if isinstance(model, Cas) else model.segments(grooves)
             work = run.work
             table5.append(WorkRow(run.method, solver, unit, work.motion_steps, work.contact_queries, segments))
     assert exact is not None

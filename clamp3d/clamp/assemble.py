@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from clamp3d.baselines.cas import Cas
@@ -16,17 +15,18 @@ from clamp3d.clamp.contact import Contact, measure_contacts
 from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
-from clamp3d.clamp.forces import contact_forces
 from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
-from clamp3d.clamp.play import Closing, Log, Meetings, meetings, play
+from clamp3d.clamp.play import Log, meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import HELD, B, D, S, Section, W
+from clamp3d.clamp.section import HELD, D, S, Section
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
-from clamp3d.clamp.stepped import SteppedState, solve_bisection, solve_stepped
+from clamp3d.clamp.stepped import SteppedState, solve_stepped
+from clamp3d.clamp.ways import Closing, Meetings
 from clamp3d.errors import SolverError
+from clamp3d.geometry.pose import Array
 
 STEP, TILT_STEP = 1.0 / 3.0, math.radians(1.0)
 """Move along the bolt (mm) and turn (rad) of the paper's program, derived from its Table 4."""
@@ -98,14 +98,14 @@ def assemble(
         clamp = replace(clamp, sequence=text("sequence", sequence))
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
     resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
-    log = Log(section, on_waypoint)
+    log, start = Log(section, on_waypoint), open_start(section)
     final: FinalState | SteppedState
     if solver == "exact":
-        final, closing = _close(section)
+        final, closing = _close(section, start)
     else:
-        solve = solve_stepped if solver == "stepped" else partial(solve_bisection, resolution=RESOLUTION)
-        final = solve(section, step=step, tilt_step=tilt_step, progress=progress)
-        closing = Closing(open_start(section), final.q, final.q, [], [])
+        until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
+        final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
+        closing = Closing(start, final.q, final.q, [])
     return _assembled(log, steps, closing, final, solver, resolution, others)
 
 
@@ -145,20 +145,18 @@ def _assembled(
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
         start=Start(float(q[D]), 0.0, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
-        forces=contact_forces(section, proven) if proven else (),
+        forces=proven.forces(section) if proven else (),
         others=_others(section, proven) if proven and others else None,
         with_play=_with_play(section, proven) if proven and others else None,
     )
 
 
-def _close(section: Section) -> tuple[FinalState, Closing]:
+def _close(section: Section, start: Array) -> tuple[FinalState, Closing]:
     """The proven final state and how the closing came there."""
     met: Meetings = []
-    final = solve_final_state(section, on_contact=lambda pair, q: met.append((pair, q)))
+    final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
     met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    by_hand = [(pair, q) for pair, q in met if not q[B : W + 1].any()]
-    taken = [(pair, q) for pair, q in met if q[B : W + 1].any()]
-    return final, Closing(final.start, final.held, final.q, by_hand, taken)
+    return final, Closing(start, final.held, final.q, met)
 
 
 def _add_silent_contacts(
@@ -184,9 +182,9 @@ def _with_play(section: Section, final: FinalState) -> tuple[Play, ...]:
             end = solve_final_state(free, final.q)
         except SolverError as error:
             ends.append(Play(joints, f"not proven: {error}", None))
-            continue
-        status = closing_status(free, end)
-        ends.append(Play(joints, status.text, free.splint_distance(end.q) if status.clamped else None))
+        else:
+            status = closing_status(free, end)
+            ends.append(Play(joints, status.text, free.splint_distance(end.q) if status.clamped else None))
     return tuple(ends)
 
 

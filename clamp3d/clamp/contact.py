@@ -10,9 +10,8 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import PAIRS, Pair, plain
-from clamp3d.clamp.parts import parts
+from clamp3d.clamp.parts import groove_pairs, parts
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.section import SPLINTS
 from clamp3d.clamp.surfaces import SURFACES, TOUCHING, Surface, surfaces_at

@@ -7,9 +7,7 @@ Section frame of the paper: x right, y down, so "depth" and "below" are along +y
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias, cast
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta
@@ -44,7 +42,6 @@ TITLES: dict[PartName, str] = {
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Wire:
     """A conductor, by catalogue name or by ``diameter``; exactly one of the two. Raises InputError if it is unknown."""
 
@@ -68,7 +65,6 @@ class Wire:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class GrooveDimensions:
     """A groove's arc: its centre lies ``offset`` beside the bolt axis and ``centre_depth`` below the part's origin."""
 
@@ -78,7 +74,6 @@ class GrooveDimensions:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UpSplint:
     """P1: a plate with its two grooves underneath. Origin: its top left corner."""
 
@@ -102,7 +97,6 @@ class UpSplint:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DownSplint:
     """P2: grooves on top, a round back that tilts in the saddle. Origin: centre of the round back."""
 
@@ -152,7 +146,6 @@ class DownSplint:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Saddle:
     """P3: saddle washer under the round back. Origin: centre of its concave arc."""
 
@@ -174,7 +167,6 @@ class Saddle:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Bolt:
     """P4: hexagon bolt, head below the saddle. Origin: its free (upper) end."""
 
@@ -195,7 +187,6 @@ class Bolt:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Nut:
     """P5: hexagon nut and washers together, on the up splint. Origin: its free (upper) face."""
 
@@ -204,7 +195,6 @@ class Nut:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Joints:
     """Whether parts use their sideways play: the bolt in the up splint's ``hole``, the down splint's round back in the
     ``saddle``, the saddle ``washer`` on the bolt. The paper holds the down splint on the bolt's axis: none of it."""
@@ -215,7 +205,6 @@ class Joints:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """What a tightening is measured by, where it is given: the most ``bolt_force`` in N, the most ``line_load`` on a
     wire in N/mm, and the ``wire_pull`` in N that each wire must hold lengthwise."""
@@ -226,7 +215,6 @@ class Limits:
 
 
 @checked
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Clamp:
     """A parallel groove clamp with its two wires, connection matrix and assembly sequence."""
 
@@ -299,9 +287,8 @@ class Clamp:
 
     def connection(self, a: PartName, b: PartName) -> ConnectionType:
         """Entry c_ij of the connection matrix (Eq. 1 and Table 1 of the paper), symmetric."""
-        rows = cast(Mapping[str, Mapping[str, ConnectionType]], self.connections)
-        first, second = sorted((a, b))
-        return rows.get(first, {}).get(second, 0)
+        entries = ((first, *entry) for first, row in self.connections.items() for entry in row.items())
+        return next((kind for first, second, kind in entries if {first, second} == {a, b}), 0)
 
     def __post_init__(self) -> None:
         down = self.down_splint

@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import TITLES, PartName
 from clamp3d.clamp.final_state import FinalState, open_up, solve_final_state
 from clamp3d.clamp.section import EDGE, SIZE, WIRES, D, S, Section, U
@@ -69,7 +67,6 @@ def equilibria(section: Section) -> tuple[FinalState, ...]:
     >>> [round(section.splint_distance(state.q), 3) for state in equilibria(section)]
     [31.638, 31.53]
     """
-    instance("section", section, Section)
     states: list[FinalState] = []
     last: SolverError | None = None
     for start in initial_guesses(section):
@@ -103,13 +100,13 @@ def describe(state: FinalState, slipped: tuple[PartName, ...]) -> str:
     words = []
     for wire in WIRES:
         on = {pair[0]: feature for pair, feature in state.active if pair[1] == wire and feature.startswith(OFF_ARC)}
-        kinds = {
-            p: f"{'the face' if name.startswith('flat') else 'a lip'} of the {TITLES[p]}" for p, name in on.items()
-        }
         if wire in slipped:
             words.append(f"{TITLES[wire]} slips out of its groove")
-        elif kinds:
-            words.append(f"{TITLES[wire]} on {' and '.join(kinds.values())}")
+        elif on:
+            kinds = {part: "the face" if feature.startswith("flat") else "a lip" for part, feature in on.items()}
+            words.append(
+                f"{TITLES[wire]} on " + " and ".join(f"{kind} of the {TITLES[part]}" for part, kind in kinds.items())
+            )
         elif wire in state.loose:
             words.append(f"{TITLES[wire]} loose")
     return ", ".join([*words, *stop_words(state.active)])
@@ -121,7 +118,7 @@ def initial_guesses(section: Section) -> list[Array]:
     tilts = np.linspace(-limit, limit, _TILTS)
     lifted = section.clamp.lifted(tilts)
     faces = [-section.face_gap(lever * tilt * np.eye(SIZE)[S]) for tilt in tilts]  # least d without an overlap
-    line, jumper = (_Landscape.of(section, i, tilts) for i in range(len(WIRES)))
+    line, jumper = (_Landscape(section, i, tilts) for i in range(len(WIRES)))
 
     def height(k: int, a: int, b: int) -> float:
         return float(max(faces[k], line.least[k][a], jumper.least[k][b]) + lifted[k])
@@ -141,7 +138,6 @@ def initial_guesses(section: Section) -> list[Array]:
     return [opened for q in guesses if (opened := open_up(section, q, step)) is not None]
 
 
-@dataclass(frozen=True)
 class _Landscape:
     """How close a wire lets the splints come: ``least`` (t, n) mm at all tilts and positions ``x`` (n,).
 
@@ -149,27 +145,20 @@ class _Landscape:
     position ``outside`` leaves the clamp.
     """
 
-    x: Array
-    over: Array
-    under: Array
-    least: list[list[float]]
-    outside: int
-
-    @classmethod
-    def of(cls, section: Section, i: int, tilts: Array) -> _Landscape:
+    def __init__(self, section: Section, i: int, tilts: Array) -> None:
         wire, bolt = WIRES[i], section.bolt_x
         up, down = section.pairs["P1", wire], section.pairs["P2", wire]
         r, (low, high) = up.cylinder.radius, section.reach(wire)
         face = section.clamp.down_splint.face_depth
-        x = np.linspace(low, high, _POSITIONS)
-        over = _curve(section, up, x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
+        self.x, self.outside = np.linspace(low, high, _POSITIONS), 0 if i == 0 else _POSITIONS - 1
+        self.over = _curve(section, up, self.x, section.clamp.up_splint.thickness + 1.01 * r, -1.0)
         deep = max(abs(face - 1.01 * r), abs(-float(down.T_a_groove[2, 3]) + down.groove.radius))
         aside, c = deep * math.sin(tilts[-1]), math.cos(tilts[-1])
         u = np.linspace((low - bolt - aside) / c, (high - bolt + aside) / c, _POSITIONS)
         v = _curve(section, down, u, face - 1.01 * r, 1.0)
-        under = np.array([_turned(u, v, tilt, bolt, x) for tilt in tilts])
-        least = np.round((over - under) / (_LEVEL * r)) * (_LEVEL * r)
-        return cls(x, over, under, least.tolist(), 0 if i == 0 else _POSITIONS - 1)
+        self.under = np.array([_turned(u, v, tilt, bolt, self.x) for tilt in tilts])
+        least = np.round((self.over - self.under) / (_LEVEL * r)) * (_LEVEL * r)
+        self.least: list[list[float]] = least.tolist()
 
     def minima(self, k: int) -> list[int]:
         """Positions of the local minima at tilt k, but for where the wire leaves the clamp; the first of level ones."""
@@ -197,12 +186,10 @@ def _curve(section: Section, pair: GroovePair, u: Array, start: float, sign: flo
     """How deep (n,) a wire's centre gets into a groove at positions u (n,), from depth ``start`` in sense ``sign``."""
     T = np.tile(np.eye(4), (len(u), 1, 1))
     T[:, 0, 3], T[:, 2, 3] = u, -start
-    moving = np.arange(len(u))
     for _ in range(_ADVANCES):
-        way = section.model.distances(pair, T[moving])
-        T[moving, 2, 3] -= sign * np.maximum(way, 0.0)
-        moving = moving[way > 1e-5 * pair.cylinder.radius]
-        if not len(moving):
+        way = section.model.distances(pair, T)
+        T[:, 2, 3] -= sign * np.maximum(way, 0.0)
+        if way.max() <= 1e-5 * pair.cylinder.radius:
             break
     return -T[:, 2, 3]
 

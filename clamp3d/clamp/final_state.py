@@ -12,12 +12,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING, STILL, STRIDE, OnContact, descend, open_start
 from clamp3d.clamp.dimensions import Clamp, PartName
+from clamp3d.clamp.forces import HELD as HELD_ON_AXIS
+from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.section import HELD, SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.clamp.status import ClosingStatus, closing_status
@@ -52,8 +53,6 @@ class FinalState:
     ----------
     q : ndarray (10,)
         The state as in `section`.
-    start : ndarray (10,)
-        Where its closing began.
     held : ndarray (10,)
         Where the path was when the down splint, closed by hand, came to rest: before the nut takes up the joints' play.
     gaps : Gaps
@@ -73,7 +72,6 @@ class FinalState:
     """
 
     q: Array
-    start: Array
     held: Array
     gaps: Gaps
     multipliers: Array
@@ -96,6 +94,24 @@ class FinalState:
     def is_proven(self) -> bool:
         """Feasible, stationary, and no saddle."""
         return self.residual <= TOLERANCE and self.curvature >= -LEVEL
+
+    def forces(self, section: Section) -> tuple[Force, ...]:
+        """The contact forces that hold the state, those on the wires first: the multipliers of its active gaps.
+
+        >>> from clamp3d.clamp.loader import load_clamp
+        >>> section = Section(load_clamp(), Cas())
+        >>> [(f.a, f.b, round(f.force, 3)) for f in solve_final_state(section).forces(section)][:2]
+        [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
+        """
+        q, gaps, forces, total = self.q, self.gaps, [], 0.0
+        for k in np.flatnonzero(self.multipliers):
+            (a, b), push = gaps.pair[k], self.multipliers[k] * gaps.normal[k]
+            forces.append(world_force(q, a, b, gaps.feature[k], push, gaps.point[k]))
+            total += float(push[0]) * ((b == "P2") - (a == "P2"))
+        if not section.clamp.joints.saddle and abs(total) > 1e-9:
+            down = section.down_splint(q)
+            forces.append(world_force(q, "P4", "P2", HELD_ON_AXIS, np.array([-total, 0.0]), (down.x, down.y)))
+        return tuple(forces)
 
 
 def solve_final_state(
@@ -129,13 +145,13 @@ def solve_final_state(
     held = end = descend(section, start, free=HELD, stride=stride, on_contact=on_contact)
     if section.free != HELD:
         end = descend(section, held, stride=stride, on_contact=on_contact)
-    final = _best(section, end, start, held)
+    final = _best(section, end, held)
     for attempt in range(_ATTEMPTS):
         if final.is_proven:
             return final
         # Degenerate active set or saddle point: let it slide off, or restart from a perturbed, slightly opened state.
         q = end if attempt == 0 else _perturb(section, final.q, attempt)
-        again = _best(section, descend(section, q, stride=stride, at_rest=STILL), start, held)
+        again = _best(section, descend(section, q, stride=stride, at_rest=STILL), held)
         if again.is_proven or again.residual < final.residual:
             final = again
     if final.is_proven:
@@ -169,17 +185,17 @@ def open_up(section: Section, q: Array, step: float) -> Array | None:
     return None
 
 
-def _best(section: Section, q: Array, start: Array, held: Array) -> FinalState:
+def _best(section: Section, q: Array, held: Array) -> FinalState:
     """The state at the end of a path, with the active set that proves it best."""
     states: list[FinalState] = []
     for active in _ACTIVE_TRIES:
-        states.append(_certify(section, q, start, held, active))
+        states.append(_certify(section, q, held, active))
         if states[-1].residual <= TOLERANCE:
             break
     return min(states, key=lambda state: state.residual)
 
 
-def _certify(section: Section, q: Array, start: Array, held: Array, active: float) -> FinalState:
+def _certify(section: Section, q: Array, held: Array, active: float) -> FinalState:
     """Polish a state whose active set are the gaps within ``active`` mm, settle loose wires, and measure the proof."""
     q, step = _polish(section, q, active)
     gaps = section.gaps(q)
@@ -197,7 +213,6 @@ def _certify(section: Section, q: Array, start: Array, held: Array, active: floa
     complementarity = float(multipliers @ np.abs(gaps.value))  # by this much the distance is off
     return FinalState(
         q=q,
-        start=start,
         held=q if section.free == HELD else held,  # nothing moves while the nut turns
         gaps=gaps,
         multipliers=multipliers,
@@ -249,24 +264,17 @@ def _multipliers(section: Section, gaps: Gaps, active: float) -> Array:
     return multipliers
 
 
-def _touched(section: Section, gaps: Gaps, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The free coordinates that any of the gaps ``rows`` depends on."""
-    free = np.array(section.free)
-    return np.asarray(free[np.abs(gaps.gradient[np.ix_(rows, free)]).max(axis=0, initial=0.0) > 0.0])
-
-
 def _polish(section: Section, q: Array, active: float) -> tuple[Array, float]:
     """Newton's method on stationarity and the active gaps together; returns the state and its last step in mm.
 
     A gap that a step has closed too far joins the active set.
     """
-    step = np.inf
+    step, free = np.inf, np.array(section.free)
     for _ in range(20):
         gaps = section.gaps(q)
         multipliers = _multipliers(section, gaps, active)
         overlapping = (gaps.value < -TOLERANCE) & (gaps.value >= -active)
         rows = np.flatnonzero((multipliers > 0.0) | overlapping)
-        free = _touched(section, gaps, rows)
         A, k, n = gaps.gradient[rows], len(rows), len(free)
         hessian = -section.hessian(q, gaps, multipliers)[np.ix_(free, free)]
         kkt = np.block([[hessian, -A[:, free].T], [A[:, free], np.zeros((k, k))]])
@@ -284,11 +292,10 @@ def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array)
     """Least second derivative of the Lagrangian by unit motions of the critical cone.
 
     The critical cone keeps the strongly active gaps (multiplier > 0) closed and lets no weakly active one (closed to
-    `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here (a plane is looked at degree by degree);
-    more are looked at by random directions.
+    `TOLERANCE`, multiplier 0) overlap. It has one or two dimensions here, and is looked at in random directions.
     """
-    strong = np.flatnonzero(multipliers)
-    free = _touched(section, gaps, strong)
+    strong, free = np.flatnonzero(multipliers), np.array(section.free)
+    free = free[gaps.gradient[np.ix_(strong, free)].any(axis=0)]  # what is neither held nor driven is level
     if not len(free):
         return np.inf
     _, sizes, rows = np.linalg.svd(gaps.gradient[np.ix_(strong, free)])
@@ -300,11 +307,7 @@ def _least_curvature(section: Section, q: Array, gaps: Gaps, multipliers: Array)
     weak = np.flatnonzero((np.abs(gaps.value) <= TOLERANCE) & (multipliers == 0.0))
     if least >= -LEVEL or not len(weak):
         return least
-    if len(tangent) <= 2:
-        angle = np.linspace(0.0, 2.0 * np.pi, 721)
-        motions = np.column_stack([np.cos(angle), np.sin(angle)])[:, : len(tangent)]
-    else:
-        motions = np.random.default_rng(0).normal(size=(20_000, len(tangent)))
+    motions = np.random.default_rng(0).normal(size=(20_000, len(tangent)))
     motions /= np.maximum(np.linalg.norm(motions, axis=1), 1e-9)[:, None]
     opens = gaps.gradient[np.ix_(weak, free)] @ tangent.T @ motions.T
     motions = motions[(opens >= -1e-7).all(axis=0)]

@@ -1,19 +1,14 @@
-"""The contact forces that hold a final state, per newton of bolt force: the multipliers of its active gaps."""
+"""A contact force, per newton of bolt force."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from clamp3d.clamp.dimensions import PartName
-from clamp3d.clamp.matrix import plain
-from clamp3d.clamp.section import Section
 from clamp3d.geometry.pose import Array
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.final_state import FinalState
 
 HELD = "held on the bolt's axis"
 """What carries the sideways force that frictionless contacts leave, where the joints are said to have no play."""
@@ -43,32 +38,6 @@ class Force:
     force: float
     point: Array
     direction: Array
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self)
-
-
-def contact_forces(section: Section, final: FinalState) -> tuple[Force, ...]:
-    """The forces of a final state, those on the wires first; see `Force`.
-
-    >>> from clamp3d.baselines.cas import Cas
-    >>> from clamp3d.clamp.final_state import solve_final_state
-    >>> from clamp3d.clamp.loader import load_clamp
-    >>> section = Section(load_clamp(), Cas())
-    >>> [(f.a, f.b, round(f.force, 3)) for f in contact_forces(section, solve_final_state(section))][:2]
-    [('P1', 'P6', 0.541), ('P2', 'P6', 0.541)]
-    """
-    q, gaps = final.q, final.gaps
-    forces, total = [], 0.0
-    for k in np.flatnonzero(final.multipliers):
-        (a, b), push = gaps.pair[k], float(final.multipliers[k])
-        forces.append(world_force(q, a, b, gaps.feature[k], push * gaps.normal[k], gaps.point[k]))
-        total += push * gaps.normal[k, 0] * ((b == "P2") - (a == "P2"))
-    if not section.clamp.joints.saddle and abs(total) > 1e-9:
-        down = section.down_splint(q)
-        forces.append(world_force(q, "P4", "P2", HELD, np.array([-total, 0.0]), (down.x, down.y)))
-    return tuple(forces)
 
 
 def world_force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:

@@ -23,7 +23,6 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,6 +35,7 @@ from clamp3d.clamp.final_state import closed
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, S, Section
+from clamp3d.clamp.torque import coefficients
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
 
@@ -180,24 +180,22 @@ class FrictionBand:
         self.section, self.final, status = closed(replace(clamp, joints=Joints()))
         if not (status.clamped and all(seat.seated for seat in status.seats)):
             raise InputError(f"friction band: needs both wires in the arcs of all four grooves, got {status.text!r}")
+        self._arcs = _Arcs(self.section)
 
     @property
     def distance(self) -> float:
         """Splint distance without friction, mm."""
         return self.section.splint_distance(self.final.q)
 
-    @cached_property
-    def _arcs(self) -> _Arcs:
-        return _Arcs(self.section)
-
     def ends(self, friction: float) -> tuple[float, float]:
         """The least and the greatest splint distance at which equilibrium exists, mm, without certificates."""
-        least, greatest = (self._extreme(_friction(friction), sense) for sense in (1.0, -1.0))
-        return least[0], greatest[0]
+        (friction,) = coefficients("groove friction", [friction])
+        least, greatest = (self._extreme(friction, sense)[0] for sense in (1.0, -1.0))
+        return least, greatest
 
     def band(self, friction: float) -> Band:
         """The band of a friction with certificates at both ends. Raises SolverError if they cannot be had."""
-        friction = _friction(friction)
+        (friction,) = coefficients("groove friction", [friction])
         least, greatest = (self._end(friction, sense) for sense in (1.0, -1.0))
         return Band(friction, least, greatest)
 
@@ -231,8 +229,7 @@ class FrictionBand:
             d, valid = self._states(tilt, share, friction)
             score = np.where(valid, sense * self._splint_distance(d, tilt[:, None]), np.inf)
             i, j = divmod(int(score.argmin()), len(share))
-            if score[i, j] < best[0]:
-                best = float(score[i, j]), float(d[i, j]), float(tilt[i])
+            best = min(best, (float(score[i, j]), float(d[i, j]), float(tilt[i])))
             low, high = max(i - _BESIDE, 0), min(i + _BESIDE, len(tilt) - 1)
             tilt = np.append(np.linspace(tilt[low], tilt[high], 2 * _TILTS), best[2])
             tilt.sort()
@@ -334,9 +331,3 @@ class Balance:
             world_force(self.q, *self.gaps.pair[k], self.gaps.feature[k], total[k], self.gaps.point[k])
             for k in np.flatnonzero(np.hypot(*total.T) > BALANCED)
         )
-
-
-def _friction(friction: float) -> float:
-    if not 0.0 < friction <= MOST_FRICTION:
-        raise InputError(f"groove friction must be > 0 and at most {MOST_FRICTION:g}, got {friction:g}")
-    return float(friction)

@@ -30,8 +30,7 @@ def builtin_clamps() -> list[str]:
     >>> builtin_clamps()
     ['reference']
     """
-    folder = Path(__file__).with_name("data")
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(file.stem for file in Path(__file__).with_name("data").glob("*.toml"))
 
 
 def load_clamp(

@@ -26,8 +26,8 @@ from clamp3d.checks import choice, function, number, positive, whole
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.closing import descend, open_start
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
+from clamp3d.clamp.parts import groove_pairs
 from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.section import SIZE, WIRES, Section
 from clamp3d.clamp.status import closing_status
@@ -264,17 +264,14 @@ def _approach(pair: GroovePair, poses: Array, away: Array) -> tuple[Array, NDArr
     groove, cylinder = pair.groove, pair.cylinder
     # Far enough for the thickest wire in the steepest pose; from there every step is safe.
     far = 4.0 * (groove.radius + cylinder.radius) + cylinder.length + float(np.abs(poses[:, :3, 3]).max())
-    local, home = np.ascontiguousarray(poses), poses[:, :3, 3].copy()
-    travel, active = np.full(len(poses), far), np.arange(len(poses))
+    local, travel = np.array(poses), np.full(len(poses), far)
     for _ in range(_ITERATIONS):
-        local[active, :3, 3] = home[active] - travel[active, None] * away
-        gap = signed_distances(groove, cylinder, local[active])
-        travel[active] -= gap
-        active = active[(gap > _TOUCH) & (travel[active] > -far)]
-        if not len(active):
+        local[:, :3, 3] = poses[:, :3, 3] - travel[:, None] * away
+        measured = signed_distances(groove, cylinder, local, full=True)
+        travel = np.maximum(travel - measured.distance, -far)
+        if not ((measured.distance > _TOUCH) & (travel > -far)).any():
             break
-    local[:, :3, 3] = home - travel[:, None] * away
-    return np.where(travel <= -far, np.inf, travel), signed_distances(groove, cylinder, local, full=True).feature
+    return np.where(travel <= -far, np.inf, travel), measured.feature
 
 
 def _last(closes: Callable[[Array], NDArray[np.bool_]], reach: float) -> float:

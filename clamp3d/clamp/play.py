@@ -15,9 +15,9 @@ from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.scene import CONTACT
-from clamp3d.clamp.section import D, Section
+from clamp3d.clamp.section import B, D, Section, W
 from clamp3d.clamp.sequence import Step, as_published
-from clamp3d.clamp.ways import DIRECTIONS, SPARE, Offsets, Plan, corners
+from clamp3d.clamp.ways import DIRECTIONS, SPARE, Closing, Leg, Offsets, Plan, corners
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.scene import Part, Scene
@@ -25,21 +25,11 @@ from clamp3d.engine.verdict import Verdict
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, SectionPose, inverse
 
-_SCREW: frozenset[str] = frozenset(("P4", "P5"))
-Meetings = list[tuple[Pair, Array]]
-"""Pairs of parts, each with the state (10,) in which they meet."""
-
-
-@dataclass(frozen=True)
-class Closing:
-    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way, by
-    hand and where the nut takes up the joints' play."""
-
-    start: Array
-    held: Array
-    end: Array
-    by_hand: Meetings
-    taken: Meetings
+_PUBLISHED: dict[PartName, tuple[PartName, str, str]] = {
+    "P1": ("P6", "line between the splints", "up splint rests on the line"),
+    "P7": ("P7", "jumper between the splints", "jumper in the up splint's groove"),
+}
+"""The paper's own steps by the part that is grasped: the wire that the up splint meets, and the moments of the way."""
 
 
 @dataclass
@@ -80,97 +70,70 @@ def play(steps: tuple[Step, ...], closing: Closing, log: Log) -> float:
 
     Raises SequenceError for a step that no way leads to.
     """
-    plan, travel = None, 0.0
-    if not as_published(steps):
-        plan = _plan(steps, closing, log)
-        log.aside = plan.offsets(0)
-        log.reach(steps[0].name, "parts apart", plan.bases[0])
+    published = _published_ways(log.section, closing.start) if as_published(steps) else None
+    plan, travel = Plan(log.section, steps, closing, log.cache, published), 0.0
+    log.aside = plan.offsets(0)
+    log.reach(steps[0].name, "open clamp beside the line" if plan.is_published else "parts apart", plan.bases[0])
     for k, step in enumerate(steps):
         if step.kind == "close":
             _close_splints(step.name, closing, log)
         elif step.kind == "tighten":
             travel = _tighten_nut(step, closing, log)
-        elif plan is not None:
-            _bring(plan, k, log)
-        elif step.part == "P7":
-            _insert_jumper(step.name, closing, log)
         else:
-            _approach_line(step.name, closing, log)
+            _bring(plan, k, log)
     return travel
 
 
-def _plan(steps: tuple[Step, ...], closing: Closing, log: Log) -> Plan:
-    section = log.section
-    start, end = section.poses(closing.start), section.poses(closing.end)
-    held = section.poses(closing.held, saddle_d=float(closing.start[D]))
-    bases = [start]
-    for step in steps:
-        bases.append({"bring": bases[-1], "close": held, "tighten": end}[step.kind])
-    return Plan(section.clamp, steps, bases, float(closing.start[D] - closing.end[D]), log.cache)
+def _published_ways(section: Section, start: Array) -> list[tuple[Leg, ...]]:
+    """Clamp and jumper come in from the right, half-way between the splints' faces: then up and down to their places.
+
+    The jumper waits clear of the clamp's way in.
+    """
+    clamp, (x6, y6, x7, y7) = section.clamp, start[:4].tolist()
+    under = section.down_splint(start).point(0.0, clamp.down_splint.face_depth)[1]
+    middle = 0.5 * (clamp.up_splint.thickness + under)
+    beside = clamp.line.radius + SPARE
+    clear = beside + clamp.up_splint.width + clamp.jumper.radius + SPARE
+    line = (("from above", middle - y6), ("from the right", beside + x6))
+    jumper = (("from below", middle - y7), ("from the right", clear + x6 - x7))
+    return [line, jumper, (), ()]
 
 
 def _bring(plan: Plan, k: int, log: Log) -> None:
     """The parts of a step come in on their way; they end where they touch, if they do."""
     step, legs, base, before, end = plan.steps[k], plan.legs[k], plan.bases[k], log.aside, plan.offsets(k + 1)
     pairs, (origin, length) = plan.meeting_pairs(k), legs[0]
-    stops = [(corners(legs)[0], f"{step.part} before its place, {legs[1][0]}")] if legs[1:] else []
+    bend, arrival = f"{step.part} before its place, {legs[-1][0]}", f"{step.part} in place, {origin}"
+    meet, travel, within = sorted((min(pair), max(pair)) for pair in pairs), sum(way for _, way in legs), CONTACT
+    if plan.is_published:
+        wire, bend, arrival = _PUBLISHED[step.part]
+        meet, travel, within = [("P1", wire)], length, math.inf
+    stops = [(corners(legs)[0], bend)] if legs[1:] else []
     engaged = base["P5"].y + plan.clamp.nut.height - base["P4"].y
-    if any(set(pair) == _SCREW for pair in pairs) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
+    if any(set(pair) == {"P4", "P5"} for pair in pairs) and DIRECTIONS[origin][2] and 0.0 < engaged < length:
         stops.append((corners([(origin, engaged)])[0], "nut on the bolt's end"))
     for corner, label in stops:
         log.aside = {**before, **{name: end[name] + corner for name in step.parts}}
         log.reach(step.name, label, base)
     log.aside = end
-    log.reach(step.name, f"{step.part} in place, {origin}", base)
-    travel = sum(length for _, length in legs)
-    log.touch(step.name, sorted((min(pair), max(pair)) for pair in pairs), base, travel, within=CONTACT)
-
-
-def _opened(section: Section) -> tuple[Array, float]:
-    """The state in which the clamp comes in, and the height (mm) half-way between its splints' faces."""
-    opened, clamp = section.open_state(section.open_distance()), section.clamp
-    under = float(section.down_splint(opened).point(0.0, clamp.down_splint.face_depth)[1])
-    return opened, 0.5 * (clamp.up_splint.thickness + under)
-
-
-def _approach_line(step: str, closing: Closing, log: Log) -> None:
-    """The open clamp comes in from the right until the line lies under its groove, then settles on the line."""
-    section, start, clamp = log.section, closing.start, log.section.clamp
-    opened, middle = _opened(section)
-    beside, over, settled = opened.copy(), opened.copy(), opened.copy()
-    beside[1] = over[1] = middle
-    beside[0] = -clamp.line.radius - SPARE
-    # The jumper waits clear of the clamp's way in.
-    settled[:2], settled[3] = start[:2], middle
-    settled[2] = settled[0] - beside[0] + clamp.up_splint.width + clamp.jumper.radius + SPARE
-    jumper = {"P7": section.poses(settled)["P7"]}
-    for state, label in (
-        (beside, "open clamp beside the line"),
-        (over, "line between the splints"),
-        (settled, "up splint rests on the line"),
-    ):
-        log.reach(step, label, section.poses(state) | jumper)
-    log.touch(step, [("P1", "P6")], section.poses(settled), middle - float(start[1]))
-
-
-def _insert_jumper(step: str, closing: Closing, log: Log) -> None:
-    """The jumper comes in between the splints from its side and is lifted into the up splint's groove."""
-    inside, placed = closing.start.copy(), log.section.poses(closing.start)
-    _, inside[3] = _opened(log.section)
-    log.reach(step, "jumper between the splints", log.section.poses(inside))
-    log.reach(step, "jumper in the up splint's groove", placed)
-    log.touch(step, [("P1", "P7")], placed, float(inside[3] - closing.start[3]))
+    log.reach(step.name, arrival, base)
+    log.touch(step.name, meet, base, travel, within)
 
 
 def _close_splints(step: str, closing: Closing, log: Log) -> None:
     """The down splint closes by hand, the saddle left where it was; what waits apart it does not meet."""
     section, d = log.section, float(closing.start[D])
-    for pair, q in closing.by_hand:
-        if not any(np.any(log.aside.get(name, 0.0)) for name in pair):
+    for pair, q in closing.met:
+        if _is_by_hand(q) and not any(np.any(log.aside.get(name, 0.0)) for name in pair):
             poses = section.poses(q, saddle_d=d)
             log.reach(step, _meeting(pair), poses)
             log.touch(step, [pair], section.poses(q), d - float(q[D]))
     log.reach(step, "splints closed", section.poses(closing.held, saddle_d=d))
+
+
+def _is_by_hand(q: Array) -> bool:
+    """Whether a state is of the closing by hand: the nut has not begun to take up the joints' play."""
+    return not q[B : W + 1].any()
 
 
 def _meeting(pair: Pair) -> str:
@@ -184,13 +147,12 @@ def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
 
     If the down splint has not been closed by hand, the saddle takes it along. Returns the way that the nut has gone.
     """
-    section, d, seated, met = log.section, float(closing.start[D]), closing.held, closing.taken
-    if "P2" in step.parts:
-        seated, met = closing.end, closing.by_hand + closing.taken
-    elif not np.array_equal(seated, closing.end):
+    section, d, takes_along = log.section, float(closing.start[D]), "P2" in step.parts
+    seated = closing.end if takes_along else closing.held
+    if not np.array_equal(seated, closing.end):
         log.reach(step.name, "saddle meets the down splint", section.poses(seated))
-    for pair, q in met:
-        if "P2" in step.parts:
+    for pair, q in [(pair, q) for pair, q in closing.met if takes_along or not _is_by_hand(q)]:
+        if takes_along:
             log.reach(step.name, _meeting(pair), section.poses(q))
         log.touch(step.name, [pair], section.poses(q), d - float(q[D]))
     end, travel = section.poses(closing.end), d - float(closing.end[D])

@@ -16,7 +16,7 @@ from clamp3d.clamp.matrix import Difference, Pair, plain
 from clamp3d.clamp.scene import clamp_scene
 from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.engine.scene import Scene
-from clamp3d.errors import need
+from clamp3d.errors import InputError, need
 from clamp3d.geometry.pose import Array, SectionPose
 
 Solver = Literal["exact", "stepped", "bisection"]
@@ -72,10 +72,6 @@ class Start:
     line: tuple[float, float]
     jumper: tuple[float, float]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self, closing="closing_mm", tilt="tilt_deg")
-
 
 @dataclass(frozen=True, slots=True)
 class Work:
@@ -116,10 +112,6 @@ class Equilibrium:
         if self.is_equilibrium:
             return f"another equilibrium: {where}" + (f": {self.detail}" if self.detail else "")
         return f"also ends at {where} (no equilibrium: {self.detail})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return plain(self, distance="distance_mm", closing="closing_mm", tilt="tilt_deg", is_equilibrium="rests")
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +244,19 @@ class Assembly:
         """The final state as a scene: everything that works on scenes works on it."""
         return clamp_scene(self.clamp, {part: self.T_world(part) for part in self.poses})
 
+    def waypoint(self, state: str) -> Waypoint:
+        """The waypoint of a state: ``open`` is where the run begins, a step is where it ends, ``final`` the run's end.
+
+        A step is named as in the sequence or by its number. Raises InputError for any other name, with the choices.
+        """
+        ends = {waypoint.step: waypoint for waypoint in self.path}
+        numbered = {str(i): end for i, end in enumerate(ends.values(), 1)}
+        states = {"open": self.path[0]} | ends | numbered | {"final": self.path[-1]}
+        if state not in states:
+            steps = ", ".join(f"{step} (or {i})" for i, step in enumerate(ends, 1))
+            raise InputError(f"unknown state {state!r}; available: open, {steps}, final")
+        return states[state]
+
     def scene_at(self, waypoint: Waypoint) -> Scene:
         """The parts at a waypoint of `path` as a scene."""
         instance("waypoint", waypoint, Waypoint)
@@ -311,6 +316,7 @@ class Assembly:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, as ``clamp3d run --json`` writes it; lengths in mm, angles in degrees."""
+        keys = {"distance": "distance_mm", "closing": "closing_mm", "tilt": "tilt_deg", "is_equilibrium": "rests"}
         return {
             "clamp3d": __version__,
             "clamp": self.clamp.name,
@@ -341,9 +347,9 @@ class Assembly:
             "matrix_differences": [d.to_dict() for d in self.matrix_differences],
             "findings": [plain(finding) for finding in self.findings],
             "residuals": {"largest_violated_gap_mm": self.violation, "optimality_mm": self.optimality},
-            "other_ends": None if self.others is None else [e.to_dict() for e in self.others],
-            "start": self.start.to_dict(),
-            "forces": [f.to_dict() for f in self.forces],
+            "other_ends": None if self.others is None else [plain(e, **keys) for e in self.others],
+            "start": plain(self.start, **keys),
+            "forces": [plain(force) for force in self.forces],
             "with_play_mm": None
             if self.with_play is None
             else {", ".join(p.joints): p.distance for p in self.with_play},

@@ -14,19 +14,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
-from clamp3d.clamp.features import groove_pairs
 from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.parts import groove_pairs
 from clamp3d.geometry.pose import Array, SectionPose
-from clamp3d.kernel.contact_model import GroovePair
 
 _INDEX = {name: i for i, name in enumerate(PARTS)}
 SPLINTS: tuple[PartName, PartName] = ("P1", "P2")
@@ -107,76 +104,40 @@ class Gap:
         return cls(*parts, feature, height - radius, foot, normal, centre)
 
 
-class _Frame(NamedTuple):
-    """Where a part stands, seen from P1: place in mm, cosine and sine of its angle."""
-
-    x: float
-    y: float
-    cos: float = 1.0
-    sin: float = 0.0
-
-    def seen(self, x: float, y: float) -> tuple[float, float]:
-        """A point of P1's axes in the part's."""
-        dx, dy = x - self.x, y - self.y
-        return dx * self.cos - dy * self.sin, dx * self.sin + dy * self.cos
-
-    def turned(self, u: float, v: float) -> tuple[float, float]:
-        """A direction of the part's axes in P1's."""
-        return u * self.cos + v * self.sin, v * self.cos - u * self.sin
-
-    def point(self, u: float, v: float) -> tuple[float, float]:
-        """A point of the part's axes in P1's."""
-        x, y = self.turned(u, v)
-        return x + self.x, y + self.y
+_AT_REST = SectionPose(0.0, 0.0)
 
 
-_AT_REST = _Frame(0.0, 0.0)
-
-
-@dataclass(eq=False)
 class Section:
     """A clamp whose grooves are measured by ``model``.
 
-    ``queries`` counts how often the model was asked about a groove and a wire: C of Table 5.
+    Attributes
+    ----------
+    queries : int
+        How often the model was asked about a groove and a wire: C of Table 5.
+    pairs : dict of GroovePair
+        The clamp's grooves with what lies in them.
+    lever : float
+        Half width of the down splint in mm: it turns the tilt into a length.
+    bolt_x : float
+        Axis of the up splint's hole from P1's left edge in mm.
+    free : tuple of int
+        The coordinates of q that move.
+    least_slack : float
+        Least difference of a wire's and its groove's radius in mm.
     """
 
-    clamp: Clamp
-    model: ContactModel
-    queries: int = field(default=0, init=False)
+    def __init__(self, clamp: Clamp, model: ContactModel) -> None:
+        instance("clamp", clamp, Clamp)
+        check_model(model)
+        self.clamp, self.model, self.queries = clamp, model, 0
+        self.pairs = groove_pairs(clamp)
+        self.lever, self.bolt_x = clamp.down_splint.width / 2, clamp.up_splint.width / 2
+        shifts = ((B, clamp.joints.hole), (V, clamp.joints.washer), (W, clamp.joints.saddle))
+        self.free = (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
+        self.least_slack = min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
+        self._twists = self._part_twists()
 
-    def __post_init__(self) -> None:
-        instance("clamp", self.clamp, Clamp)
-        check_model(self.model)
-
-    @cached_property
-    def pairs(self) -> dict[Pair, GroovePair]:
-        """The clamp's grooves with what lies in them."""
-        return groove_pairs(self.clamp)
-
-    @cached_property
-    def lever(self) -> float:
-        """Half width of the down splint in mm: it turns the tilt into a length."""
-        return self.clamp.down_splint.width / 2
-
-    @cached_property
-    def bolt_x(self) -> float:
-        """Axis of the up splint's hole from P1's left edge in mm."""
-        return self.clamp.up_splint.width / 2
-
-    @cached_property
-    def free(self) -> tuple[int, ...]:
-        """The coordinates of q that move."""
-        joints = self.clamp.joints
-        shifts = ((B, joints.hole), (V, joints.washer), (W, joints.saddle))
-        return (0, 1, 2, 3, D, S, *(i for i, plays in shifts if plays), U)
-
-    @cached_property
-    def least_slack(self) -> float:
-        """Least difference of a wire's and its groove's radius in mm."""
-        return min(abs(p.groove.radius - p.cylinder.radius) for p in self.pairs.values() if p.a != "P3")
-
-    @cached_property
-    def _twists(self) -> Array:
+    def _part_twists(self) -> Array:
         """How the parts (7,) move right and down (mm) and turn (rad) with q and the turns of both wires over their
         radius: (7, 3, 12)."""
         twist = np.zeros((len(PARTS), 3, SIZE + len(WIRES)))
@@ -192,13 +153,7 @@ class Section:
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
-        down = self._down(q)
-        return SectionPose(down.x, down.y, float(q[S]) / self.lever)
-
-    def _down(self, q: Array) -> _Frame:
-        angle = float(q[S]) / self.lever
-        x, y = self.bolt_x + float(q[B] + q[V] + q[W]), float(q[D] - q[U])
-        return _Frame(x, y, math.cos(angle), math.sin(angle))
+        return SectionPose(self.bolt_x + q[[B, V, W]].sum(), q[D] - q[U], q[S] / self.lever)
 
     def poses(self, q: Array, saddle_d: float | None = None) -> dict[PartName, SectionPose]:
         """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
@@ -251,10 +206,10 @@ class Section:
 
     def escaped(self, q: Array) -> tuple[PartName, ...]:
         """The wires whose centre is beside a splint: nothing leads them back."""
-        down, places = self._down(q), zip(WIRES, q[:4].reshape(2, 2).tolist(), strict=True)
+        down, places = self.down_splint(q), zip(WIRES, q[:4].reshape(2, 2).tolist(), strict=True)
         width = self.clamp.up_splint.width
         return tuple(
-            wire for wire, (x, y) in places if not (0.0 <= x <= width and abs(down.seen(x, y)[0]) <= self.lever)
+            wire for wire, (x, y) in places if not (0.0 <= x <= width and abs(down.local(x, y)[0]) <= self.lever)
         )
 
     def open_state(self, d: float, tilt: float = 0.0) -> Array:
@@ -286,23 +241,23 @@ class Section:
 
     def gaps(self, q: Array) -> Gaps:
         """All gaps at a state: both wires, inner faces, stops, and the round back in the saddle."""
-        down = self._down(q)
+        down = self.down_splint(q)
         stops = [*self._faces(down), *self._stops(q, down), *self._groove("P3", "P2", q, down)]
         return self._collect(q, [*self._wire("P6", q, down), *self._wire("P7", q, down), *stops])
 
     def wire_gaps(self, q: Array, wire: PartName) -> Gaps:
         """Gaps of one wire to both splints, every piece of the contact model, and to the bolt."""
-        return self._collect(q, self._wire(wire, q, self._down(q)))
+        return self._collect(q, self._wire(wire, q, self.down_splint(q)))
 
     def face_gap(self, q: Array) -> float:
         """The least gap between the inner faces (convex object collision, type 2 of the paper); mm."""
-        return min(row.value for row in self._faces(self._down(q)))
+        return min(row.value for row in self._faces(self.down_splint(q)))
 
     def seated(self, q: Array) -> Array:
         """The state with the saddle drawn up to the round back, as the contact model sees them."""
         q = q.copy()
         for _ in range(_ADVANCES):
-            gap = min(row.value for row in self._groove("P3", "P2", q, self._down(q)))
+            gap = min(row.value for row in self._groove("P3", "P2", q, self.down_splint(q)))
             if abs(gap) <= 1e-12 * self.clamp.saddle.radius:
                 break
             q[[D, U]] -= gap
@@ -311,7 +266,7 @@ class Section:
     def work(self, q: Array, pair: Sequence[Pair], point: Array, push: Array) -> Array:
         """Work (k, 12) of ``push`` (k, 2) on the second part of each pair at ``point`` (k, 2), and of its reaction on
         the first, for unit changes of q and of the turns of both wires over their radius."""
-        origin, down = np.zeros((len(PARTS), 2)), self._down(q)
+        origin, down = np.zeros((len(PARTS), 2)), self.down_splint(q)
         origin[1], origin[5], origin[6] = (down.x, down.y), q[:2], q[2:4]
         total = 0.0
         for side, sign in ((0, -1.0), (1, 1.0)):
@@ -327,12 +282,12 @@ class Section:
         A round that moves along a surface changes the gap by its curvature, and where the down splint turns, the arm
         from its origin turns with it, or the surface's normal.
         """
-        origin, total = self._down(q)[:2], np.zeros((SIZE, SIZE))
+        down, total = self.down_splint(q), np.zeros((SIZE, SIZE))
         twists = self._twists[:, :, :SIZE]
         turn = twists[1, 2]
 
         def velocity(part: PartName, at: Point) -> Array:
-            right, below = np.subtract(at, origin) if part == "P2" else (0.0, 0.0)
+            right, below = np.subtract(at, (down.x, down.y)) if part == "P2" else (0.0, 0.0)
             return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn * (part == "P2")))
 
         for k in np.flatnonzero(force):
@@ -342,7 +297,7 @@ class Section:
             along = np.array([-y, x]) @ (move - velocity(row.surface, row.centre))
             own = row.curvature * np.outer(along, along)
             if "P2" in (row.surface, row.round):
-                own -= ((x, y) @ np.subtract(row.centre, origin)) * np.outer(turn, turn)
+                own -= ((x, y) @ np.subtract(row.centre, (down.x, down.y))) * np.outer(turn, turn)
             if row.surface == "P2":
                 right, below = move - twists[1, :2]
                 cross = np.outer(turn, x * below - y * right)
@@ -364,7 +319,7 @@ class Section:
             rows=rows,
         )
 
-    def _wire(self, wire: PartName, q: Array, down: _Frame) -> list[Gap]:
+    def _wire(self, wire: PartName, q: Array, down: SectionPose) -> list[Gap]:
         """Gaps of a wire to both splints and to the shank, which stands between the wires: each keeps to its side."""
         i, side = 2 * WIRES.index(wire), -1.0 if wire == "P6" else 1.0
         shank = (self.bolt_x + float(q[B]) + side * 0.5 * self.clamp.bolt.diameter, 0.0)
@@ -372,18 +327,18 @@ class Section:
         bolt = Gap.flat(("P4", wire), "shank", shank, (side, 0.0), q[i : i + 2].tolist(), radius)
         return [*self._groove("P1", wire, q, down), *self._groove("P2", wire, q, down), bolt]
 
-    def _groove(self, part: PartName, inside: PartName, q: Array, down: _Frame) -> list[Gap]:
+    def _groove(self, part: PartName, inside: PartName, q: Array, down: SectionPose) -> list[Gap]:
         """The contact model's pieces of a groove for the wire or the round back that lies in it."""
         pair, frame = self.pairs[part, inside], down if part == "P2" else _AT_REST
         if inside == "P2":
-            centre, c, s = (down.x, down.y), down.cos, -down.sin
-            frame = _Frame(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
+            body, frame = down, SectionPose(down.x - q[W], q[D] - self.clamp.back_clearance)
         else:
             self.queries += 1
             i = 2 * WIRES.index(inside)
-            centre, c, s = (float(q[i]), float(q[i + 1])), frame.cos, frame.sin
-        u, v = frame.seen(*centre)
-        T = np.array([[c, 0.0, s, u], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, -v], [0.0, 0.0, 0.0, 1.0]])
+            body = SectionPose(q[i], q[i + 1])
+        centre = body.x, body.y
+        u, v = frame.local(*centre)
+        T = SectionPose(u, v, body.angle - frame.angle).T()
         pieces, r, R = self.model.pieces(pair, T), pair.cylinder.radius, pair.groove.radius
         rows = []
         points, normals = pieces.point.tolist(), pieces.normal.tolist()
@@ -397,7 +352,7 @@ class Section:
         if inside != "P2":
             self._end_face(rows, u, v)
         for row in rows:
-            row.point, row.normal = frame.point(*row.point), frame.turned(*row.normal)
+            row.point, row.normal = frame.point(*row.point), frame.direction(*row.normal)
         return rows
 
     def _end_face(self, rows: list[Gap], u: float, v: float) -> None:
@@ -426,7 +381,7 @@ class Section:
             (side * beyond / away, looks * above / away),
         )
 
-    def _faces(self, down: _Frame) -> list[Gap]:
+    def _faces(self, down: SectionPose) -> list[Gap]:
         """Gaps of the splints' inner faces, which are straight, so least at an end of their overlap."""
         up, face, rows = self.clamp.up_splint, self.clamp.down_splint.face_depth, []
         for side, feature in ((-1.0, "left edge"), (1.0, "right edge")):
@@ -434,10 +389,10 @@ class Section:
             if side * (corner[0] - edge[0]) <= 0.0:  # P2's corner under P1's face
                 rows.append(Gap.flat(("P1", "P2"), feature, edge, (0.0, 1.0), corner))
             else:  # P1's edge over P2's face
-                rows.append(Gap.flat(("P2", "P1"), feature, corner, down.turned(0.0, -1.0), edge))
+                rows.append(Gap.flat(("P2", "P1"), feature, corner, down.direction(0.0, -1.0), edge))
         return rows
 
-    def _stops(self, q: Array, down: _Frame) -> list[Gap]:
+    def _stops(self, q: Array, down: SectionPose) -> list[Gap]:
         """What ends the down splint's tilt and slide (Table 2 of the paper): its underside on the saddle's edges, its
         slot on the shank, and the play of hole and washer where there is any."""
         rows, clamp, joints = [], self.clamp, self.clamp.joints
@@ -449,7 +404,7 @@ class Section:
         underside = down.point(0.0, splint.underside_depth)
         for side in (-1.0, 1.0):
             edge, shank = (saddle_axis + side * 0.5 * saddle.width, edge_y), axis + side * 0.5 * clamp.bolt.diameter
-            rows.append(Gap.flat(("P2", "P3"), EDGES, underside, down.turned(0.0, 1.0), edge))
+            rows.append(Gap.flat(("P2", "P3"), EDGES, underside, down.direction(0.0, 1.0), edge))
             for depth in depths:
                 wall = down.point(side * 0.5 * splint.slot_width, depth)
                 rows.append(Gap.flat(("P4", "P2"), "slot", (shank, 0.0), (side, 0.0), wall))

@@ -82,19 +82,10 @@ def with_dimensions(clamp: Clamp, values: Mapping[str, float]) -> Clamp:
     >>> with_dimensions(load_clamp(), {"up_splint.thickness": 28.0}).up_splint.thickness
     28.0
     """
-    tree: dict[str, Any] = {}
-    for name, value in values.items():
+    for name in values:
         choice("dimension", name, DIMENSIONS)
-        *path, last = name.split(".")
-        node = tree
-        for key in path:
-            node = node.setdefault(key, {})
-        node[last] = float(value)
-    for wire in ("line", "jumper"):
-        if wire in tree:
-            tree[wire]["conductor"] = None
-    tree.setdefault("down_splint", {})["max_tilt_deg"] = None
-    changed: Clamp = _replaced(clamp, tree)
+    conductors = {f"{wire}.conductor": None for wire in ("line", "jumper") if f"{wire}.diameter" in values}
+    changed: Clamp = _changed(clamp, {**values, **conductors, "down_splint.max_tilt_deg": None})
     return changed
 
 
@@ -128,8 +119,13 @@ def sensitivity(clamp: Clamp) -> tuple[Sensitivity, ...]:
     return tuple(sorted(rows, key=lambda row: -round(abs(row.derivative), 9)))
 
 
-def _replaced(part: Any, tree: Mapping[str, Any]) -> Any:
-    return replace(part, **{k: _replaced(getattr(part, k), v) if isinstance(v, dict) else v for k, v in tree.items()})
+def _changed(part: Any, values: Mapping[str, Any]) -> Any:
+    """A part with other values at dotted names, all at once."""
+    new = {}
+    for head in {name.partition(".")[0] for name in values}:
+        inner = {name.removeprefix(f"{head}."): v for name, v in values.items() if name.startswith(f"{head}.")}
+        new[head] = _changed(getattr(part, head), inner) if inner else values[head]
+    return replace(part, **new)
 
 
 def _derivatives(section: Section, final: FinalState) -> Array:

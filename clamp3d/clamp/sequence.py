@@ -38,7 +38,6 @@ class Step:
 
 
 _MOST = 30  # steps: each that is not published costs seconds of search, and seven parts need about as many
-_SADDLE_AND_BOLT: frozenset[PartName] = frozenset(("P3", "P4"))
 
 
 def parse_sequence(text: str) -> tuple[Step, ...]:
@@ -64,7 +63,7 @@ def parse_sequence(text: str) -> tuple[Step, ...]:
             )
         if again and step.parts == {"P2"}:
             step = replace(step, kind="close")
-        elif again and step.part == "P5" and step.parts - {"P2"} == {"P5"} | _SADDLE_AND_BOLT:
+        elif again and step.part == "P5" and step.parts - {"P2"} == {"P3", "P4", "P5"}:
             step = replace(step, kind="tighten")
         ended |= step.parts if step.kind != "bring" else set()
         brought |= step.parts

@@ -1,8 +1,8 @@
 """Final states found by trying positions: for any contact model, also one without smooth gradients.
 
-`solve_stepped` does it as the paper's program: the down splint's distance along the bolt takes multiples of ``step``,
-its tilt multiples of ``tilt_step``, the wires settle freely, and the first position without overlap counts.
-`solve_bisection` goes on from there with moves halved until they are below a resolution.
+It is done as by the paper's program: the down splint's distance along the bolt takes multiples of ``step``, its tilt
+multiples of ``tilt_step``, the wires settle freely, and the first position without overlap counts. Bisection goes on
+from there with moves halved until they are below a resolution.
 """
 
 from __future__ import annotations
@@ -53,10 +53,37 @@ class _Search:
                 return state
         return None
 
-    def end(self, q: Array) -> SteppedState:
-        """The last free state, with the saddle drawn up."""
-        q = self.section.seated(q)
-        return SteppedState(q, self.section.gaps(q), self.tried)
+    def in_steps(self, step: float, tilt_step: float) -> Array:
+        """The last free state of moves down by ``step``, each to the free tilt that is nearest."""
+        section, limit = self.section, int(self.section.clamp.tilt_stop / tilt_step + 1e-9)
+        tilts, tilt, first = range(-limit, limit + 1), 0, math.ceil(self.section.open_distance() / step)
+        q = section.open_state(first * step)
+        for k in range(first, -_MOVES, -1):
+            nearest = sorted(tilts, key=lambda i: (abs(i - tilt), abs(i)))
+            lower = self.lower(q, k * step, (i * tilt_step for i in nearest), settle=False)
+            if lower is None:
+                break
+            q, tilt = lower, round(float(lower[S]) / section.lever / tilt_step)
+        if k == first:
+            raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
+        # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
+        free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
+        return max(free, key=lambda p: min(float(section.wire_gaps(p, wire).value.min()) for wire in WIRES), default=q)
+
+    def by_halves(self, q: Array, step: float, tilt_step: float, resolution: float) -> Array:
+        """The last free state from q on, of moves that are halved until ``step`` is at most ``resolution``."""
+        limit = self.section.clamp.tilt_stop
+        while step > resolution:
+            step, tilt_step = 0.5 * step, 0.5 * tilt_step
+            # A move down may need a turn of many tilt steps: those of twice the size are next.
+            turns = [0.0, *(tilt_step * 2.0**k for k in range(math.floor(math.log2(2.0 * limit / tilt_step)) + 1))]
+            lower: Array | None = q
+            while lower is not None:
+                q, tilt = lower, float(lower[S]) / self.section.lever
+                tilts = dict.fromkeys(tilt + side * turn for turn in turns for side in (1.0, -1.0))
+                allowed = [candidate for candidate in tilts if abs(candidate) <= limit]
+                lower = self.lower(q, float(q[D]) - step, allowed, settle=True)
+        return q
 
 
 def solve_stepped(
@@ -64,65 +91,29 @@ def solve_stepped(
     *,
     step: float,
     tilt_step: float,
+    resolution: float = math.inf,
     progress: Callable[[int, float], None] | None = None,
 ) -> SteppedState:
     """Close the clamp in moves of ``step`` mm and ``tilt_step`` rad; ``progress`` is told the moves made and d in mm.
 
+    Then both are halved until the step is at most ``resolution`` mm. No move of one step is free from the state found,
+    as far as tilts were tried: its distance d is at least the least one there is. How much more is not bounded.
+
     Raises InputError for moves that are not positive, SolverError if the open clamp already overlaps.
     """
-    start = section.open_distance()
     for name, value, reach, unit in (
-        ("step", step, start, "mm"),
+        ("step", step, section.open_distance(), "mm"),
         ("tilt step", math.degrees(tilt_step), math.degrees(section.clamp.tilt_stop), "deg"),
     ):
         if not value > 0.0:
             raise InputError(f"{name} must be > 0 {unit}, got {value:g}")
         if not value * _MOVES >= reach:
             raise InputError(f"{name} must be >= {reach / _MOVES:.4g} {unit} here, got {value:g}")
-    limit = int(section.clamp.tilt_stop / tilt_step + 1e-9)
-    tilts = range(-limit, limit + 1)
-    first = math.ceil(start / step)
-    q, tilt, search = section.open_state(first * step), 0, _Search(section, progress)
-    for k in range(first, -_MOVES, -1):
-        nearest = sorted(tilts, key=lambda i: (abs(i - tilt), abs(i)))
-        lower = search.lower(q, k * step, (i * tilt_step for i in nearest), settle=False)
-        if lower is None:
-            break
-        q, tilt = lower, round(float(lower[S]) / section.lever / tilt_step)
-    if k == first:
-        raise SolverError(f"the open clamp overlaps at a distance of {k * step:.4g} mm: nothing to close")
-    # Of the tilts that are free at the last distance, the one that leaves the wires the widest gaps.
-    free = [p for i in tilts if (p := _place(section, q, q[D], i * tilt_step, settle=True)) is not None]
-    q = max(free, key=lambda p: min(float(section.wire_gaps(p, wire).value.min()) for wire in WIRES), default=q)
-    return search.end(q)
-
-
-def solve_bisection(
-    section: Section,
-    *,
-    resolution: float,
-    step: float,
-    tilt_step: float,
-    progress: Callable[[int, float], None] | None = None,
-) -> SteppedState:
-    """Close the clamp in steps, then halve step and tilt step until the step is at most ``resolution`` mm.
-
-    No move of one step is free from the state found, as far as tilts were tried: its distance d is at least the least
-    one there is. How much more is not bounded. Raises as `solve_stepped`.
-    """
-    state = solve_stepped(section, step=step, tilt_step=tilt_step, progress=progress)
-    q, search, limit = state.q, _Search(section, progress, state.motion_steps), section.clamp.tilt_stop
-    while step > resolution:
-        step, tilt_step = 0.5 * step, 0.5 * tilt_step
-        # A move down may need a turn of many tilt steps: those of twice the size are next.
-        turns = [0.0, *(tilt_step * 2.0**k for k in range(math.floor(math.log2(2.0 * limit / tilt_step)) + 1))]
-        lower: Array | None = q
-        while lower is not None:
-            q, tilt = lower, float(lower[S]) / section.lever
-            tilts = dict.fromkeys(tilt + side * turn for turn in turns for side in (1.0, -1.0))
-            allowed = [candidate for candidate in tilts if abs(candidate) <= limit]
-            lower = search.lower(q, float(q[D]) - step, allowed, settle=True)
-    return search.end(q)
+    search = _Search(section, progress)
+    q = section.seated(search.in_steps(step, tilt_step))
+    if step > resolution:
+        q = section.seated(search.by_halves(q, step, tilt_step, resolution))
+    return SteppedState(q, section.gaps(q), search.tried)
 
 
 def _place(section: Section, q: Array, d: float, tilt: float, settle: bool) -> Array | None:

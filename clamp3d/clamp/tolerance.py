@@ -12,7 +12,7 @@ import math
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, ProcessPoolExecutor, wait
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -179,11 +179,10 @@ def monte_carlo(
     nominal, nominal_status = _closed(clamp)
     progress = progress or (lambda done, of: None)
     progress(0, n)
-    chunks: dict[int, list[Sample]] = {}
-    for k, chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
-        chunks[k] = chunk
-        progress(sum(map(len, chunks.values())), n)
-    samples = [sample for k in sorted(chunks) for sample in chunks[k]]
+    samples: list[Sample] = []
+    for chunk in _solve(spec, [range(k, min(k + CHUNK, n)) for k in range(0, n, CHUNK)], processes, scheduler):
+        samples += chunk
+        progress(len(samples), n)
     distance = np.array([math.nan if d is None else d for d, _ in samples])
     return MonteCarlo(spec, nominal, nominal_status, distance, tuple(status for _, status in samples))
 
@@ -212,8 +211,8 @@ def _tolerances(clamp: Clamp, tolerance: float | None, percent: float) -> tuple[
     return tuple((general | wires).values())
 
 
-def _chunk(spec: Spec, indices: range) -> tuple[int, list[Sample]]:
-    return indices.start, [_sample(spec, index) for index in indices]
+def _chunk(spec: Spec, indices: range) -> list[Sample]:
+    return [_sample(spec, index) for index in indices]
 
 
 def _sample(spec: Spec, index: int) -> Sample:
@@ -231,20 +230,19 @@ def _closed(clamp: Clamp) -> Sample:
     return (section.splint_distance(final.q) if status.clamped else None), status.text
 
 
-def _solve(spec: Spec, tasks: list[range], processes: int, scheduler: str | None) -> Iterator[tuple[int, list[Sample]]]:
-    """Chunks as they are finished, in any order."""
+def _solve(spec: Spec, tasks: list[range], processes: int, scheduler: str | None) -> Iterator[list[Sample]]:
+    """Chunks in their order, each as soon as it and all before it are finished."""
     if scheduler is None and processes == 1:
         yield from (_chunk(spec, task) for task in tasks)
         return
     with _cluster(scheduler) if scheduler is not None else _processes(min(processes, len(tasks))) as (pool, workers):
         futures = [pool.submit(_chunk, spec, task) for task in tasks]
-        waiting = set(futures)
         try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
-                if not done and not workers():
-                    raise SolverError("no workers are left")
-                yield from (future.result() for future in done)
+            for future in futures:
+                while not wait([future], timeout=_PATIENCE).done:
+                    if not workers():
+                        raise SolverError("no workers are left")
+                yield future.result()
         finally:
             for future in futures:
                 future.cancel()

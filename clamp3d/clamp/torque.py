@@ -12,17 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from clamp3d.checks import number
 from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.forces import HELD, Force
 from clamp3d.clamp.matrix import plain
+from clamp3d.clamp.result import Assembly
 from clamp3d.clamp.section import WIRES
 from clamp3d.errors import InputError
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.result import Assembly
 
 THREAD_FRICTION = (0.10, 0.14, 0.20)
 """Friction of thread and nut face. Chosen from classes B and C of VDI 2230, table A5 (0.08 to 0.16, 0.14 to 0.24)."""
@@ -181,7 +179,9 @@ def tighten(
     >>> f"{tight.preload.low / 1e3:.1f} to {tight.preload.high / 1e3:.1f} kN"
     '15.6 to 28.9 kN'
     """
-    torque = check_torque(torque)
+    torque = number("torque", torque)
+    if not 0.0 < torque <= 1e6:
+        raise InputError(f"torque must be > 0 and at most 1e6 Nm, got {torque:g}")
     thread, groove = (coefficients(n, v) for n, v in (("friction", friction), ("groove friction", groove_friction)))
     if not (assembly.clamped and assembly.forces):
         raise InputError(f"torque: needs a clamp that the exact solver has closed, got {assembly.status!r}")
@@ -247,11 +247,3 @@ def _sources(clamp: Clamp, thread: Sequence[float], groove: Sequence[float]) -> 
         Coefficient("friction of thread and nut face", listed[0], f"{own[0]}; VDI 2230, table A5: 0.04 to 0.35"),
         Coefficient("friction of wire and groove", listed[1], f"{own[1]}: not measured"),
     )
-
-
-def check_torque(torque: float) -> float:
-    """A torque in Nm. Raises InputError unless it is > 0 and at most 1e6."""
-    torque = number("torque", torque)
-    if not 0.0 < torque <= 1e6:
-        raise InputError(f"torque must be > 0 and at most 1e6 Nm, got {torque:g}")
-    return torque

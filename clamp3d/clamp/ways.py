@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clamp3d.clamp.contact import Poses
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair, plain
 from clamp3d.clamp.parts import parts, wire_solid
-from clamp3d.clamp.section import WIRES
+from clamp3d.clamp.section import WIRES, D, Section
 from clamp3d.clamp.sequence import Step
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.allowed import Allowed
@@ -26,7 +24,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.result import NOT_CLEAN, PairResult
 from clamp3d.engine.scene import Part, Scene
-from clamp3d.errors import SequenceError, SolverError
+from clamp3d.errors import SequenceError
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import Solid
@@ -53,9 +51,11 @@ _SAMPLES = (0.5, 0.25, 0.125, 0.0625, 0.03125)
 _SHORTEST = 0.5
 """Shortest leg of a way with a bend, mm; chosen."""
 _HERE = np.zeros(3)
-_ROUNDS = 1000  # parts that are still in each other's way push each other round in a circle
 Offsets = Mapping[PartName, Array]
 """How far parts that wait are from where the section has them, (3,) mm of the world."""
+
+Meetings = list[tuple[Pair, Array]]
+"""Pairs of parts, each with the state (10,) in which they meet."""
 
 Leg = tuple[str, float]
 """Where the parts come from (`DIRECTIONS`), and how far, mm; a way out is its legs from the place."""
@@ -98,33 +98,21 @@ class Block:
         return plain(self, travel="travel_mm", way="way_mm") | {"t": self.travel / self.way}
 
 
-@dataclass(frozen=True)
 class Insertion:
     """Parts that come to their places as one: the first ones of ``pairs`` move, the second ones stand.
 
     ``place`` holds their poses (4, 4) in the world, ``cache`` keeps their models.
     """
 
-    clamp: Clamp
-    pairs: Sequence[Pair]
-    place: Mapping[PartName, Array]
-    cache: ModelCache = field(default_factory=ModelCache)
-
-    @cached_property
-    def _moving(self) -> tuple[PartName, ...]:
-        return tuple(sorted({a for a, _ in self.pairs}))
-
-    @cached_property
-    def _solids(self) -> dict[PartName, Solid]:
-        """The clamp's parts, wires as good as endless."""
-        length, wires = _ENDLESS * self.clamp.wire_length, (self.clamp.line, self.clamp.jumper)
-        endless = {name: wire_solid(name, wire.radius, length) for name, wire in zip(WIRES, wires, strict=True)}
-        return parts(self.clamp) | endless
-
-    @property
-    def _farthest(self) -> float:
-        """The longest way, mm: a longer one would lead over a wire's end."""
-        return 0.5 * (_ENDLESS - 2.0) * self.clamp.wire_length
+    def __init__(
+        self, clamp: Clamp, pairs: Sequence[Pair], place: Mapping[PartName, Array], cache: ModelCache | None = None
+    ) -> None:
+        self.clamp, self.pairs, self.place, self.cache = clamp, pairs, place, cache or ModelCache()
+        self._moving, self._standing = (tuple(sorted({pair[k] for pair in pairs})) for k in (0, 1))
+        length = _ENDLESS * clamp.wire_length
+        self._farthest = 0.5 * (length - 2.0 * clamp.wire_length)  # a longer way would lead over a wire's end
+        wires = zip(WIRES, (clamp.line, clamp.jumper), strict=True)
+        self._solids = parts(clamp) | {name: wire_solid(name, wire.radius, length) for name, wire in wires}
 
     def way_out(self) -> tuple[Leg, ...]:
         """The first free way; empty if there is none, and `blocks` says why."""
@@ -167,17 +155,15 @@ class Insertion:
 
     def _exits(self, start: Array) -> Iterator[Leg]:
         """Directions that lead out, each with how far until the moving parts' common box leaves that of the others."""
-        standing = sorted({b for _, b in self.pairs})
         for origin in DIRECTIONS:
-            length = self._length(start, origin, standing)
+            length = self._length(start, origin, self._standing)
             if length <= self._farthest:
                 yield origin, length
 
     def _bends(self) -> Iterator[Leg]:
         """First legs: along the wires past all that is no wire, else a part of how far the parts can go."""
-        standing = sorted({b for _, b in self.pairs})
         for origin, (_, along, _) in DIRECTIONS.items():
-            others = [name for name in standing if name not in WIRES] if along else standing
+            others = [name for name in self._standing if not (along and name in WIRES)]
             length = self._length(_HERE, origin, others, beside=True) + SPARE
             if length > self._farthest:
                 continue
@@ -245,19 +231,41 @@ def corners(legs: Sequence[Leg]) -> list[Array]:
     return list(np.cumsum([out(*leg) for leg in legs], axis=0))
 
 
+@dataclass(frozen=True)
+class Closing:
+    """What the solver found: the states at the start, closed by hand and at the end, and the contacts on the way."""
+
+    start: Array
+    held: Array
+    end: Array
+    met: Meetings
+
+
 class Plan:
     """The ways of all ``steps``, and where each part stands before each step.
 
-    ``bases`` are the poses before each step and after the last, of parts that do not wait; ``rise`` (mm) is how far the
-    nut draws the bolt up. Raises SequenceError for a step that no way leads to.
+    The ways are searched for unless they are ``published``. ``bases`` are the poses before each step and after the
+    last, of parts that do not wait. Raises SequenceError for a step that no way leads to.
     """
 
     def __init__(
-        self, clamp: Clamp, steps: Sequence[Step], bases: Sequence[Poses], rise: float, cache: ModelCache
+        self,
+        section: Section,
+        steps: Sequence[Step],
+        closing: Closing,
+        cache: ModelCache,
+        published: list[tuple[Leg, ...]] | None = None,
     ) -> None:
-        self.clamp, self.steps, self.bases, self._cache = clamp, steps, bases, cache
-        self.legs = [self._way(k, rise) for k in range(len(steps))]
-        self._spread()
+        self.clamp, self.steps, self._cache, self.is_published = section.clamp, steps, cache, published is not None
+        start, end = section.poses(closing.start), section.poses(closing.end)
+        held = section.poses(closing.held, saddle_d=float(closing.start[D]))
+        self.bases = [start]
+        for step in steps:
+            self.bases.append({"bring": self.bases[-1], "close": held, "tighten": end}[step.kind])
+        rise = float(closing.start[D] - closing.end[D])
+        self.legs = published or [self._way(k, rise) for k in range(len(steps))]
+        if not self.is_published:
+            self._spread()
 
     def offsets(self, k: int) -> Offsets:
         """How far each part is from its place before step k: by the ways of all steps that still bring it."""
@@ -279,7 +287,10 @@ class Plan:
         return next((j for j in reversed(later) if len(self.steps[j].parts & {a, b}) == 1), None)
 
     def _way(self, k: int, rise: float) -> tuple[Leg, ...]:
-        """The way out of the parts that a step brings; none for a step that closes the clamp."""
+        """The way out of the parts that a step brings; none for a step that closes the clamp.
+
+        ``rise`` (mm) is how far the nut draws the bolt up.
+        """
         step, place = self.steps[k], {name: pose.T() for name, pose in self.bases[k].items()}
         insertion = Insertion(self.clamp, self.meeting_pairs(k), place, self._cache)
         if step.kind == "bring":
@@ -303,45 +314,24 @@ class Plan:
         )
 
     def _spread(self) -> None:
-        """Move what waits out of the way of what moves before it: it waits further out on its own way."""
-        for _ in range(_ROUNDS):
-            conflict = next(self._conflicts(), None)
-            if conflict is None:
-                return
-            step, length = conflict
-            *legs, (origin, last) = self.legs[step]
-            self.legs[step] = (*legs, (origin, last + length))
-        raise SolverError(f"no places found where the parts of {' -> '.join(map(str, self.steps))} can wait apart")
+        """What waits where something comes near it before its own step waits further out on its own way."""
+        for later, step in enumerate(self.steps):
+            while step.kind == "bring" and (length := self._lacking(later)):
+                *legs, (origin, last) = self.legs[later]
+                self.legs[later] = (*legs, (origin, last + length))
 
-    def _conflicts(self) -> Iterator[tuple[int, float]]:
-        """Steps that must bring their parts from further away, and by how much, mm."""
-        for k, step in enumerate(self.steps):
-            boxes = self._swept(k)
-            for a, b in itertools.permutations(PARTS, 2):
-                later = self._parting(a, b, k)
-                moves = a < b if step.kind != "bring" else a in step.parts and b not in step.parts
-                if later is None or not moves:
-                    continue
-                (low, high), (other_low, other_high) = boxes[a], boxes[b]
-                if max((low - other_high).max(), (other_low - high).max()) >= 0.5 * SPARE:
-                    continue
-                direction = np.array(DIRECTIONS[self.legs[later][-1][0]])
-                axis = int(np.argmax(np.abs(direction)))
-                # Whichever of the two that step brings goes further out.
-                is_up = (direction.sum() > 0.0) == (b in self.steps[later].parts)
-                yield later, float(high[axis] - other_low[axis] if is_up else other_high[axis] - low[axis]) + SPARE
+    def _lacking(self, later: int) -> float:
+        """How much further out the parts that a step brings must wait than they do, mm."""
+        moving, direction, lengths = self.steps[later].parts, out(self.legs[later][-1][0]), [0.0]
+        for k, a, b in itertools.product(range(later), moving, PARTS):
+            if b not in moving and self._parting(a, b, k) == later:
+                (low, high), (other_low, other_high) = own, other = self._swept(k, a), self._swept(k, b)
+                if max((low - other_high).max(), (other_low - high).max()) < 0.5 * SPARE:
+                    lengths.append(float((other @ direction).max() - (own @ direction).min()) + SPARE)
+        return max(lengths)
 
-    def _swept(self, k: int) -> dict[PartName, Array]:
-        """Boxes (2, 3) around the parts' ways in step k; the bend of a way is a corner of the box around its ends."""
-        before, after = self.offsets(k), self.offsets(k + 1)
-        swept = {}
-        for name in PARTS:
-            ends = np.array([self._boxes[j][name] + way[name] for j in (k, k + 1) for way in (before, after)])
-            swept[name] = np.array([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)])
-        return swept
-
-    @cached_property
-    def _boxes(self) -> list[dict[PartName, Array]]:
-        """The box (2, 3) around each part at each of the bases."""
-        solids = parts(self.clamp)
-        return [{name: solids[name].bounds_at(pose.T()) for name, pose in base.items()} for base in self.bases]
+    def _swept(self, k: int, name: PartName) -> Array:
+        """Box (2, 3) around a part's way in step k; the bend of a way is a corner of the box around its ends."""
+        solid, ways = parts(self.clamp)[name], (self.offsets(k)[name], self.offsets(k + 1)[name])
+        ends = np.array([solid.bounds_at(self.bases[j][name].T()) + way for j in (k, k + 1) for way in ways])
+        return np.array([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)])

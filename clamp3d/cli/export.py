@@ -77,10 +77,9 @@ class Export(Source, Quiet):
     def _assembled(self, clamp: Clamp, state: str) -> Assembly:
         """The assembled clamp, and on stderr the ``state`` in which it is written."""
         from clamp3d.clamp.assemble import assemble  # takes long to import, and most files need none of it
-        from clamp3d.clamp.states import state as find_state
 
         run = assemble(clamp, sequence=self.sequence)
-        label = find_state(run, state).label
+        label = run.waypoint(state).label
         if not self.quiet:
             show(f"state {state}: {label} ({run.status})", err=True)
         return run

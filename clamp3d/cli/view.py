@@ -139,8 +139,7 @@ def overlay(clamp: Clamp, text: str) -> tuple[str, dict[str, list[trimesh.Trimes
     """
     import trimesh
 
-    from clamp3d.clamp.features import groove_pairs
-    from clamp3d.clamp.parts import parts
+    from clamp3d.clamp.parts import groove_pairs, parts
 
     kind, _, size = text.partition("=")
     if kind not in _OVERLAYS:

@@ -351,5 +351,16 @@ class SectionPose:
         >>> SectionPose(1.0, 2.0, np.pi / 2).point(3.0, 0.0)
         (1.0000000000000002, -1.0)
         """
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        return float(self.x + u * c + v * s), float(self.y - u * s + v * c)
+        right, down = self.direction(u, v)
+        return self.x + right, self.y + down
+
+    def direction(self, u: float, v: float) -> tuple[float, float]:
+        """Section direction (right, down) of the part's own direction (u right, v down)."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return u * c + v * s, v * c - u * s
+
+    def local(self, x: float, y: float) -> tuple[float, float]:
+        """The part's own coordinates (u right, v down) in mm of a section point (x, y): the inverse of `point`."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        right, down = x - self.x, y - self.y
+        return right * c - down * s, right * s + down * c

@@ -13,7 +13,6 @@ import numpy as np
 from clamp3d import checks
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly
-from clamp3d.clamp.states import state as find_state
 from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
@@ -183,7 +182,7 @@ def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clam
         kind = "clamp" if isinstance(source, Clamp) else "scene"
         return source, {kind: source.name, "state": None, "status": None}
     state = state or "final"
-    scene = source.scene_at(find_state(source, state))
+    scene = source.scene_at(source.waypoint(state))
     # The last bits of an optimum differ between machines: equal clamps are equal files, to 1e-9 mm and 1e-12 rad.
     digits = np.full((4, 4), 12)
     digits[:3, 3] = 9

@@ -18,6 +18,7 @@ from typing import Any
 
 from clamp3d.checks import instance, number
 from clamp3d.clamp.forces import HELD
+from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.engine.check import check
 from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
@@ -119,7 +120,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             state = "found" if "error" in worst else "note" if "warning" in worst else "clean"
             notes = [finding.text for finding in result.findings if finding.severity == "note"]
             findings = findings_of_clamp(result, drawing.timeline, drawing.extent(drawing.timeline.stops[-1].poses))
-            words = {"assembly": result, "forces": [force.to_dict() for force in forces], "notes": notes}
+            words = {"assembly": result, "forces": [plain(force) for force in forces], "notes": notes}
             self._tell(result.status, state, findings, done=True, **words)
         else:
             for stop in self._source.stops(result):

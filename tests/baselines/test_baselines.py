@@ -15,8 +15,7 @@ from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import block_pair, grooved_block
-from clamp3d.clamp.features import groove_pairs
-from clamp3d.clamp.parts import parts
+from clamp3d.clamp.parts import groove_pairs, parts
 from clamp3d.geometry.pose import inverse, rotation, translation
 from clamp3d.geometry.profile import Arc
 from clamp3d.shapes import SweptArc, mesh

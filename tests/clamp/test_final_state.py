@@ -19,7 +19,7 @@ from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.section import SIZE, WIRES, B, D, S, Section, U, V, W
-from clamp3d.clamp.stepped import solve_bisection, solve_stepped
+from clamp3d.clamp.stepped import solve_stepped
 from clamp3d.engine.model import ModelCache
 from clamp3d.errors import SolverError
 from tests.clamp.random_clamps import changed, whole_clamp
@@ -67,7 +67,7 @@ def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_
     assert found.motion_steps == tried + len(turns)
     assert k == 10 or found.q[S] == pytest.approx(section.lever * turn * turns[least.argmin()])  # 10: loose wires
     assert found.q[D] == pytest.approx(d + step, abs=1e-9)
-    fine = solve_bisection(section, resolution=0.0625, step=step, tilt_step=turn, progress=lambda *at: told.append(at))
+    fine = solve_stepped(section, resolution=0.0625, step=step, tilt_step=turn, progress=lambda *at: told.append(at))
     assert told[len(expected) : 2 * len(expected)] == expected
     made = [*(count for count, _ in told[len(expected) :]), fine.motion_steps + 1]
     assert made == sorted({*made})

@@ -8,7 +8,6 @@ from clamp3d.baselines import Cas
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import Joints
 from clamp3d.clamp.sequence import as_published, parse_sequence
-from clamp3d.clamp.states import state
 
 
 @pytest.mark.parametrize(
@@ -62,9 +61,9 @@ def test_the_papers_steps_move_their_parts_as_far_as_their_contacts_say(run):
         assert contact.gap == pytest.approx(0.0, abs=1e-6)
     assert run.turns == pytest.approx((apart[2] - run.closing) / 2.5)
     for name, k in (("open", 0), ("final", -1), ("P7", 4), ("1", 2), ("2", 4), ("4", 8)):
-        assert state(run, name) is run.path[k]
+        assert run.waypoint(name) is run.path[k]
     with pytest.raises(InputError, match=r"available: open, P1\|P2P3P4P5 \(or 1\), .*, P5\|P3P4 \(or 4\), final"):
-        state(run, "5")
+        run.waypoint("5")
 
 
 @pytest.mark.parametrize("sequence", [None, "P1|P2P3P4P5 -> P7 -> P5|P2P3P4"])

@@ -110,8 +110,7 @@ def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
 
 def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -> ContactModel:
     """The method for the parts of a clamp, set up for all of its grooves; hull thresholds are in mm here."""
-    from clamp3d.clamp.features import groove_pairs
-    from clamp3d.clamp.parts import parts
+    from clamp3d.clamp.parts import groove_pairs, parts
 
     settings = _settings(method)
     if method.family == "hulls":
