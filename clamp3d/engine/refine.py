@@ -88,7 +88,9 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         yield "meshes", _by_meshes(a, b, T, chord, enough)
     probe = exact_probe(a, b, T)
     yield "exact", probe
-    yield "exact", exact_distance(a, b, T)
+    distance = exact_distance(a, b, T)
+    # Of free-form faces it may miss where they meet: a point that lies in both solids says so.
+    yield "exact", replace(distance, lower=-np.inf) if distance.lower > probe.upper else distance
     attested, finer = -probe.upper, chords[1:]
     is_small = bool(finer) and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
     if attested <= _COINCIDENT and is_small:
