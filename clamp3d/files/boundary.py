@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import sphere_of
-from clamp3d.files.open_cascade import TOLERANCE, explore, occ
+from clamp3d.files.open_cascade import TOLERANCE, bounds_of, explore, occ
 from clamp3d.geometry.mesh import Array
 
 _BEYOND = 0.05
 """How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""
 
-_NEAR_POLE = 0.01
-"""Of a sphere's radius: how far Open CASCADE's foot may be from where the formula has it."""
+_AROUND_POLE = 0.1
+"""Of a solid's size: how far from a pole of its faces Open CASCADE's nearest points were seen to be off, and more."""
+_BESIDE_FOOT = 0.01
+"""Of a spline's range of parameters: how far beside a foot a nearer one is looked for first."""
 
 
 class Side(Enum):
@@ -61,7 +62,48 @@ class Boundary:
         every = range(1, nearest.NbSolution() + 1)
         k = next((k for k in every if nearest.SupportTypeShape1(k) == in_face), 0)
         foot = Foot(float(nearest.Value()), np.array(nearest.PointOnShape1(k or 1).Coord()), None)
-        return _in_face(foot, point, nearest, k) if k else foot
+        return self._in_face(foot, point, nearest, k) if k else foot
+
+    def _in_face(self, foot: Foot, point: Array, search: Any, number: int) -> Foot:
+        """The foot of a point (3,) that a solution is, with its normal.
+
+        Near a pole of a spline Open CASCADE's parameters are off by up to a hundredth, and the distance too large.
+        """
+        face, at = next(explore(search.SupportOnShape1(number), "FACE")), np.array(search.ParOnFaceS1(number))
+        surface = occ.BRepAdaptor_Surface(face)
+        is_spline = surface.GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface
+        if is_spline and self.is_near_pole(foot.point):
+            from scipy.optimize import minimize
+
+            def place(uv: Array) -> Array:
+                return np.array(surface.Value(*uv.tolist()).Coord())
+
+            spans = [[getattr(surface, f"{end}{along}Parameter")() for end in ("First", "Last")] for along in "UV"]
+            steps = _BESIDE_FOOT * np.diff(spans)[:, 0] * np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+            how = {"initial_simplex": np.clip(at - steps, *np.transpose(spans)), "xatol": 1e-9, "fatol": 1e-13}
+            best = minimize(
+                lambda uv: float(np.linalg.norm(place(uv) - point)), at, method="Nelder-Mead", bounds=spans, options=how
+            )
+            if best.fun < foot.distance:
+                foot, at = Foot(float(best.fun), place(best.x), None), best.x
+        middle, normal = occ.gp_Pnt(), occ.gp_Vec()
+        occ.BRepGProp_Face(face).Normal(*at.tolist(), middle, normal)
+        size = normal.Magnitude()
+        return foot._replace(normal=np.array(normal.Coord()) / size) if size > 1e-9 else foot
+
+    def is_near_pole(self, point: Array) -> bool:
+        """Whether a point (3,) is near one where all parameters of a face meet: it has a degenerate edge there."""
+        return bool((np.linalg.norm(self._poles - point, axis=1) <= _AROUND_POLE * self._size).any())
+
+    @cached_property
+    def _poles(self) -> Array:
+        edges = (edge for edge in explore(self._solid, "EDGE") if occ.BRep_Tool.Degenerated_s(edge))
+        ends = [occ.BRep_Tool.Pnt_s(next(explore(edge, "VERTEX"))).Coord() for edge in edges]
+        return np.array(ends).reshape(-1, 3)
+
+    @cached_property
+    def _size(self) -> float:
+        return float(np.linalg.norm(np.ptp(bounds_of(self._solid, quick=True), axis=0)))
 
     def side(self, point: Array) -> tuple[Side, Foot]:
         """On which side a point (3,) lies, and its foot.
@@ -89,24 +131,3 @@ class Boundary:
 def vertex(point: Array) -> Any:
     """A point (3,) as a TopoDS_Vertex."""
     return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
-
-
-def _in_face(foot: Foot, point: Array, search: Any, number: int) -> Foot:
-    """The foot of a point (3,) that a solution is, with its normal; on a sphere by formula.
-
-    There Open CASCADE's foot is off where it is near a pole, which is a degenerate edge: a depth was 25 % too large.
-    """
-    face = next(explore(search.SupportOnShape1(number), "FACE"))
-    place, normal = occ.gp_Pnt(), occ.gp_Vec()
-    occ.BRepGProp_Face(face).Normal(*search.ParOnFaceS1(number), place, normal)
-    size = normal.Magnitude()
-    if not size > 1e-9:
-        return foot
-    outward = np.array(normal.Coord()) / size
-    if any(occ.BRep_Tool.Degenerated_s(edge) for edge in explore(face, "EDGE")) and (sphere := sphere_of(face)):
-        centre, radius = sphere
-        radial = (point - centre) / max(float(np.linalg.norm(point - centre)), 1e-300)
-        on_sphere = centre + radius * radial
-        if np.linalg.norm(on_sphere - foot.point) <= _NEAR_POLE * radius:
-            return Foot(float(np.linalg.norm(point - on_sphere)), on_sphere, np.sign(radial @ outward) * radial)
-    return foot._replace(normal=outward)

@@ -77,12 +77,6 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
     )
 
 
-def sphere_of(face: Any) -> tuple[Array, float] | None:
-    """Centre (3,) and radius of a face that is some of a sphere, also of one that a file gives as a spline."""
-    kind, frame, size = _canonical(face)
-    return (frame[0], float(size[0])) if kind == SPHERE else None
-
-
 def _canonical(face: Any) -> tuple[int, Array, Array]:
     """Kind, frame (4, 3) and sizes (2,) of a face's surface, also where a file gives it as a spline."""
     kind, frame, size = _form(occ.BRepAdaptor_Surface(face))

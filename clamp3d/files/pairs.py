@@ -11,7 +11,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.boundary import Boundary, Side
-from clamp3d.files.faces import SPHERE, Surfaces, distinct_points_on, points_on, surfaces
+from clamp3d.files.faces import SPHERE, distinct_points_on, points_on, surfaces
 from clamp3d.files.open_cascade import (
     TOLERANCE,
     area_of,
@@ -33,6 +33,8 @@ _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
 
 
+_BESIDE = 0.05
+"""How far (mm) beside a point nearer ones are looked for first."""
 _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
 _COARSER = 16.0
@@ -108,28 +110,32 @@ def distance(
     if nearest.distance <= TOLERANCE:
         return nearest if near is not None else _confirmed(nearest, first, second)
     own, other = Boundary(first), Boundary(second)
-    nearest = _from_spheres(nearest, surfaces(a), np.eye(4), own, other)
-    nearest = _from_spheres(nearest.swapped(), surfaces(b), T, other, own).swapped()
+    nearest = _polished(_polished(nearest, own, other).swapped(), other, own).swapped()
     closer = min(other.foot(nearest.p).distance, own.foot(nearest.q).distance)
-    return nearest._replace(is_least=0.0 < nearest.distance <= closer + TOLERANCE)
+    return nearest._replace(is_least=TOLERANCE < nearest.distance <= closer + TOLERANCE)
 
 
-def _from_spheres(nearest: Nearest, form: Surfaces, T: Array, own: Boundary, other: Boundary) -> Nearest:
-    """Nearest points, or nearer ones on a convex sphere of the first solid, placed by ``T`` (4, 4), that ``p`` is on.
+def _polished(nearest: Nearest, own: Boundary, other: Boundary) -> Nearest:
+    """Nearest points, or nearer ones beside ``p``, where that is near a pole of the first solid's faces.
 
-    Near its poles Open CASCADE's points are up to 0.02 mm further apart. Those of a sphere are on the line from its
-    centre to what is nearest to that, if the solid has all of the sphere there.
+    There Open CASCADE's points are up to 0.02 mm further apart than the nearest ones, though each is about as near to
+    the other solid as they say.
     """
-    convex = (form.kind == SPHERE) & (form.sense > 0.0)
-    for centre, radius in zip(to_target(T, form.frame[convex, 0]), form.size[convex, 0].tolist(), strict=True):
-        if abs(float(np.linalg.norm(nearest.p - centre)) - radius) > TOLERANCE:
-            continue
-        side, (away, foot, _) = other.side(centre)
-        point = centre + radius / max(away, TOLERANCE) * (foot - centre)
-        is_nearer = side is Side.OUTSIDE and away - radius < nearest.distance
-        if is_nearer and own.foot(point).distance <= TOLERANCE:
-            nearest = Nearest(away - radius, point, foot)
-    return nearest
+    if not own.is_near_pole(nearest.p):
+        return nearest
+    from scipy.optimize import minimize
+
+    across = np.linalg.svd((nearest.q - nearest.p)[None])[2][1:]
+
+    def beside(x: Array) -> Array:
+        return own.foot(nearest.p + x @ across).point
+
+    # Where points are within 1e-4 mm of the nearest ones, their distance is within rounding.
+    how = {"initial_simplex": _BESIDE * np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), "xatol": 1e-4, "fatol": 1e-9}
+    best = minimize(lambda x: other.foot(beside(x)).distance, np.zeros(2), method="Nelder-Mead", options=how)
+    p = beside(best.x)
+    away, q, _ = other.foot(p)
+    return Nearest(away, p, q) if away < nearest.distance else nearest
 
 
 def _confirmed(nearest: Nearest, first: Any, second: Any) -> Nearest:

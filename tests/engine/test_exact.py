@@ -361,6 +361,24 @@ def test_a_dome_is_as_far_from_a_plate_as_its_centre_less_its_radius(order):
         assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("splines", [False, True])
+def test_an_ellipsoid_is_as_far_from_a_plate_as_its_support_says(splines):
+    ends = occ.gp_Pnt(0, 0, -6), occ.gp_Pnt(0, 0, 6)
+    arc = occ.gp_Elips(occ.gp_Ax2(occ.gp_Pnt(), occ.gp_Dir(0, 1, 0), occ.gp_Dir(0, 0, 1)), 6.0, 4.0)
+    edges = (occ.BRepBuilderAPI_MakeEdge(arc, *ends).Edge(), occ.BRepBuilderAPI_MakeEdge(*ends[::-1]).Edge())
+    outline = occ.BRepBuilderAPI_MakeFace(occ.BRepBuilderAPI_MakeWire(*edges).Wire()).Face()
+    solid = occ.BRepPrimAPI_MakeRevol(outline, occ.gp_Ax1(occ.gp_Pnt(), occ.gp_Dir(0, 0, 1))).Shape()
+    solid = occ.BRepBuilderAPI_NurbsConvert(solid, True).Shape() if splines else solid
+    rng = np.random.default_rng(5)
+    for tilt in 10.0 ** rng.uniform(-5, -1, 5):
+        gap, T = float(10.0 ** rng.uniform(-4, -1)), turn([*rng.normal(size=2), 0.0], tilt)
+        lowest = np.linalg.norm(np.array([4.0, 4.0, 6.0]) * T[2, :3])
+        a, b = models_of(block((-30, -30, -20), (30, 30, -lowest - gap)), moved(solid, T))
+        distance = exact_distance(a, b, np.eye(4))
+        assert distance.lower <= gap <= distance.upper
+        assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
+
+
 def test_a_distance_that_a_point_in_both_solids_contradicts_is_not_believed(monkeypatch):
     """Open CASCADE says so of a thread in a tube now and then."""
     lying = Nearest(0.02, np.zeros(3), np.array([0.0, 0.0, 0.02]))
