@@ -160,7 +160,8 @@ def instance(name: str, value: object, *kinds: type) -> None:
     """
     if not isinstance(value, kinds):
         words = " or ".join(kind.__name__ for kind in kinds)
-        raise InputError(f"{name} must be a {words}, got {type(value).__name__}")
+        article = "an" if words[0] in "AEIOUaeiou" else "a"
+        raise InputError(f"{name} must be {article} {words}, got {type(value).__name__}")
 
 
 def flag(name: str, value: object) -> bool:

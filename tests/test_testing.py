@@ -32,6 +32,16 @@ def test_fields_agree_with_a_mesh_of_the_same_shape(shape):
         assert np.abs(exact - near)[outside].max() <= 2.0 * chord_error(shape, error) + 1e-9
 
 
+@pytest.mark.parametrize("gap", [0.3, -0.3])
+def test_a_sphere_is_defined_by_its_radius(gap):
+    ball, place = shapes.sphere(5.0, mesh_error=1.0), translation(3.0, 4.0, 0.0)
+    place[:3, 3] *= (10.0 + gap) / 5.0
+    answer = distance(ball, ball, place)
+    assert_distance(answer, ball, ball, place)
+    with pytest.raises(AssertionError):
+        assert_distance(replace(answer, upper=answer.upper - 0.5, lower=-math.inf), ball, ball, place)
+
+
 def test_fields_are_nowhere_steeper_than_one():
     rng = np.random.default_rng(1)
     primitives = Cylinder(3.0, 8.0), SweptArc(7.0, 2.0, 9.0), SweptArc(7.0, 0.5, 9.0)

@@ -295,7 +295,7 @@ class Clamp:
         for key, wire in (("line", self.line), ("jumper", self.jumper)):
             _rule(
                 wire.radius < self.up_splint.width,
-                f"{key}: the diameter must be less than twice up_splint.width = {self.up_splint.width:g} mm, "
+                f"{key}: the diameter must be < {2.0 * self.up_splint.width:g} mm, twice up_splint.width, "
                 f"got {2.0 * wire.radius:g}; are both in mm?",
             )
         bolt = ("bolt.diameter", self.bolt.diameter)

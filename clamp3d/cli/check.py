@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from clamp3d.checks import short
+from clamp3d.clamp.loader import builtin_clamps
 from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import (
     INPUT_FILE,
@@ -128,6 +130,8 @@ class Accept:
 
     def run(self) -> None:
         """Write them."""
+        if not Path(self.source).exists() and self.source not in builtin_clamps():
+            raise InputError(f"{short(Path(self.source))}: no such file or folder, so it has no findings")
         path = accepted_file(self.source)
         entries = accept(path, self.identifiers, why=self.why, who=self.who)
         before = len(set(self.identifiers)) - len(entries)

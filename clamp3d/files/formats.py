@@ -124,7 +124,7 @@ def load_bodies(
     if file.is_dir():
         raise InputError(f"{file}: a folder, not one file ({', '.join(FORMATS)})")
     if kind not in FORMATS and not is_robot:
-        raise InputError(f"{file}: unknown mesh format {kind or '(none)'!r}; available: {', '.join(FORMATS)}")
+        raise InputError(f"{file}: unknown format {kind or '(none)'!r}; available: {', '.join(FORMATS)}")
     if unit is not None:
         checks.choice("unit", unit, UNITS_MM)
         if is_robot or FORMATS[kind].unit == "stated":

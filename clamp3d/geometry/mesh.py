@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -42,8 +42,8 @@ class Mesh:
     """
 
     name: str
-    vertices: Array
-    faces: IntArray
+    vertices: Array = field(repr=False)
+    faces: IntArray = field(repr=False)
     watertight: bool
     rounding: float
     notes: tuple[str, ...] = ()

@@ -214,9 +214,9 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
         raise InputError(f"the reason (--why) must not be empty, got {why!r}")
     present = read_accepted(path)
     for identifier in identifiers:
-        if not re.fullmatch(r"[0-9a-z]{8}", identifier):
+        if not re.fullmatch(r"[a-z2-7]{8}", identifier):
             raise InputError(
-                f"id of a finding must be 8 digits and letters a-z, as `check` prints it, got {identifier!r}"
+                f"id of a finding must be 8 of a-z and 2-7, as check prints it at its end, got {identifier!r}"
             )
     new = [i for i in dict.fromkeys(identifiers) if i not in present]
     entries = [Accepted(i, who or getpass.getuser(), date.today().isoformat(), why) for i in new]

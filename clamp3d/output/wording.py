@@ -224,7 +224,8 @@ def where_text(where: Overlap) -> str:
     'shared volume of the facets 0.2 to 12 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5 mm'
     """
     low, high = where.volume
-    certain = (f"{low:.{digits}g}" for digits in (5, 4, 3, 2) if f"{low:.{digits}g}" == f"{high:.{digits}g}")
+    shown = ((f"{low:#.{digits}g}", f"{high:#.{digits}g}") for digits in (5, 4, 3, 2))
+    certain = (least.rstrip(".") for least, most in shown if least == most)
     volume = next(certain, f"{_rounded(low, math.floor)} to {_rounded(high, math.ceil)}")
     ends = (
         [_rounded(round(x, 6) + 0.0, towards, digits=1) for x in corner]

@@ -13,7 +13,7 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.geometry.profile import Arc, Profile
-from clamp3d.geometry.shapes import MeshShape, Solid
+from clamp3d.geometry.shapes import MeshShape, Solid, Sphere
 
 Field = Callable[[Array], Array]
 """Of points (n, 3): <= 0 on the body, > 0 elsewhere, and nowhere steeper than 1. So a point with the value g > 0 is at
@@ -46,6 +46,9 @@ def body(shape: AnyBody) -> Body:
         return shape
     if isinstance(shape, Solid):
         return Body(_solid(shape), shape.bounds)
+    if isinstance(shape, Sphere):
+        r = shape.radius
+        return Body(lambda x: np.linalg.norm(x, axis=1) - r, np.outer([-r, r], np.ones(3)))
     if isinstance(shape, MeshShape):
         V = shape.mesh.vertices
         return Body(_mesh(V, shape.mesh.faces), np.array([V.min(axis=0), V.max(axis=0)]))

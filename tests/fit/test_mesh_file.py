@@ -29,7 +29,7 @@ def test_formats_in_mm(part, tmp_path, kind):
     assert any("carries no unit" in note for note in result.notes) == (kind != "3mf")
 
 
-test_other_files_are_refused = refusals((lambda: fit_file("a.dxf"), r"unknown mesh format '.dxf'; available: .stl"))
+test_other_files_are_refused = refusals((lambda: fit_file("a.dxf"), r"unknown format '.dxf'; available: .stl"))
 
 
 def with_slivers(mesh, edges, height):
