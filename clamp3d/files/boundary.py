@@ -65,29 +65,16 @@ class Boundary:
         return self._in_face(foot, point, nearest, k) if k else foot
 
     def _in_face(self, foot: Foot, point: Array, search: Any, number: int) -> Foot:
-        """The foot of a point (3,) that a solution is, with its normal.
-
-        Near a pole of a spline Open CASCADE's parameters are off by up to a hundredth, and the distance too large.
-        """
-        face, at = next(explore(search.SupportOnShape1(number), "FACE")), np.array(search.ParOnFaceS1(number))
+        """The foot of a point (3,) that a solution is, with its normal; polished near a pole of a spline."""
+        face, uv = next(explore(search.SupportOnShape1(number), "FACE")), np.array(search.ParOnFaceS1(number))
         surface = occ.BRepAdaptor_Surface(face)
-        is_spline = surface.GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface
-        if is_spline and self.is_near_pole(foot.point):
-            from scipy.optimize import minimize
-
-            def place(uv: Array) -> Array:
-                return np.array(surface.Value(*uv.tolist()).Coord())
-
-            spans = [[getattr(surface, f"{end}{along}Parameter")() for end in ("First", "Last")] for along in "UV"]
-            steps = _BESIDE_FOOT * np.diff(spans)[:, 0] * np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
-            how = {"initial_simplex": np.clip(at - steps, *np.transpose(spans)), "xatol": 1e-9, "fatol": 1e-13}
-            best = minimize(
-                lambda uv: float(np.linalg.norm(place(uv) - point)), at, method="Nelder-Mead", bounds=spans, options=how
-            )
-            if best.fun < foot.distance:
-                foot, at = Foot(float(best.fun), place(best.x), None), best.x
+        if surface.GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface and self.is_near_pole(foot.point):
+            nearer = _polished(surface, uv, point)
+            place = np.array(surface.Value(*nearer.tolist()).Coord())
+            if (distance := float(np.linalg.norm(place - point))) < foot.distance:
+                foot, uv = Foot(distance, place, None), nearer
         middle, normal = occ.gp_Pnt(), occ.gp_Vec()
-        occ.BRepGProp_Face(face).Normal(*at.tolist(), middle, normal)
+        occ.BRepGProp_Face(face).Normal(*uv.tolist(), middle, normal)
         size = normal.Magnitude()
         return foot._replace(normal=np.array(normal.Coord()) / size) if size > 1e-9 else foot
 
@@ -131,3 +118,20 @@ class Boundary:
 def vertex(point: Array) -> Any:
     """A point (3,) as a TopoDS_Vertex."""
     return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
+
+
+def _polished(surface: Any, uv: Array, point: Array) -> Array:
+    """Parameters (2,) of what of a BRepAdaptor_Surface is nearest to a point (3,), near ``uv`` (2,).
+
+    Near a pole those that Open CASCADE finds are off by up to a hundredth.
+    """
+    from scipy.optimize import minimize
+
+    def distance(at: Array) -> float:
+        return float(np.linalg.norm(np.array(surface.Value(*at.tolist()).Coord()) - point))
+
+    spans = np.array([[getattr(surface, f"{end}{along}Parameter")() for end in ("First", "Last")] for along in "UV"])
+    steps = _BESIDE_FOOT * (spans[:, 1] - spans[:, 0])
+    steps[uv + steps > spans[:, 1]] *= -1.0
+    how = {"initial_simplex": [uv, uv + steps * (1.0, 0.0), uv + steps * (0.0, 1.0)], "xatol": 1e-9, "fatol": 1e-13}
+    return np.asarray(minimize(distance, uv, method="Nelder-Mead", bounds=spans, options=how).x)

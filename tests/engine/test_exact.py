@@ -332,14 +332,15 @@ def test_the_overlap_of_a_ball_is_its_radius_less_the_distance_of_its_centre(fam
         assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("pole", [1.0, -1.0])
 @pytest.mark.parametrize("splines", [False, True])
-def test_near_the_pole_of_a_sphere_a_point_is_as_deep_as_the_formula_says(splines):
+def test_near_the_pole_of_a_sphere_a_point_is_as_deep_as_the_formula_says(splines, pole):
     """There Open CASCADE's nearest point is up to 1 % of the radius beside, and its distance too large."""
     solid = occ.BRepBuilderAPI_NurbsConvert(ball(5.0), True).Shape() if splines else ball(5.0)
     brep, rng = to_bytes(first_solid(solid)), np.random.default_rng(4)
     aside = rng.normal(size=(60, 2)) * 10.0 ** rng.uniform(-6, -1, (60, 1))
     away = 10.0 ** rng.uniform(-6, -1, 60) * rng.choice([-1.0, 1.0], 60)
-    points = np.column_stack([aside, np.ones(60)])
+    points = np.column_stack([aside, np.full(60, pole)])
     points *= ((5.0 - away) / np.linalg.norm(points, axis=1))[:, None]
     assert cad_process.depths(brep, points) == pytest.approx(away, abs=1e-9)
 
