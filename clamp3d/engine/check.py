@@ -227,7 +227,8 @@ class _Questions:
             distance = self._answers[*key, depth][1] if depth else distance.of_overlap()
         row = PairResult(first.name, second.name, verdict, distance.moved(first.T_world))
         if verdict in BAD:
-            return replace(row, locator=Locator(a, b, first.T_world, T, self.distances))
+            attested = distance.point_a if distance.upper < 0.0 else None
+            return replace(row, locator=Locator(a, b, first.T_world, T, self.distances, attested))
         if verdict is Verdict.UNCERTAIN:
             models = {first.name: a, second.name: b}
             return replace(row, reason=undecided(models, distance, self.scene.thresholds, allowance))

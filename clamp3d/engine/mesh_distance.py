@@ -14,7 +14,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model
-from clamp3d.engine.overlap import common, deepest, thickness
+from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.surface import TURN, Surface, fcl_pair, tree_distance
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
@@ -166,5 +166,7 @@ def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     if not outer.contains(points[outer.distance(points) > slack]).all():
         return False
     corners, faces = arrays_of(inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold)
-    # What fills a hole of the other may have all its corners on the hole's rim: the middle of its triangles has not.
-    return bool((outer.distance(np.vstack([corners, corners[faces].mean(axis=1)])) <= slack).all())
+    # What fills a hole of the other may have all its corners on the hole's rim, but not the middles of its triangles;
+    # what fills a void has these on its walls too, but not what is inside.
+    beneath = Common(corners, faces).inner_points() if len(faces) else corners
+    return bool((outer.distance(np.vstack([corners, corners[faces].mean(axis=1), beneath])) <= slack).all())

@@ -22,7 +22,7 @@ from clamp3d.engine.near_faces import FaceMeshes
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
-from clamp3d.files.faces import CONE, CYLINDER, PLANE
+from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
@@ -111,6 +111,11 @@ class Model:
     def face_meshes(self) -> FaceMeshes | None:
         """The coarse triangles of a solid from CAD by its faces; None of other shapes, and where they do not close."""
         return None
+
+    @property
+    def is_free_form(self) -> bool:
+        """Whether a solid from CAD has splines among its faces, of which Open CASCADE may say too large a gap."""
+        return False
 
     @property
     def bounds(self) -> Array:
@@ -299,6 +304,11 @@ class CadModel(Model):
         tessellation = self.shape.tessellated(CHORD)
         flat = self.shape.surfaces.kind[tessellation.face] == PLANE
         return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
+
+    @cached_property
+    def is_free_form(self) -> bool:
+        """Whether it has splines among its faces that are no plain surfaces."""
+        return bool((self.shape.surfaces.kind == OTHER).any())
 
     @cached_property
     def face_meshes(self) -> FaceMeshes | None:

@@ -211,7 +211,7 @@ def _cut(surface: Surface, T: Array, pieces: Array) -> Array:
     border = reach.argmax(axis=1)
     rows = np.arange(len(pieces))
     over = reach[rows, border] > _HAIR * surface.scale
-    return np.concatenate([_split(pieces[over], height[rows, border][over]), _quartered(pieces[~over])])
+    return np.concatenate([_split(pieces[over], height[rows, border][over]), quartered(pieces[~over])])
 
 
 def _split(pieces: Array, height: Array) -> Array:
@@ -226,7 +226,7 @@ def _split(pieces: Array, height: Array) -> Array:
     return np.concatenate([np.stack(corners, axis=1) for corners in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
 
 
-def _quartered(pieces: Array) -> Array:
+def quartered(pieces: Array) -> Array:
     """Triangles (4 m, 3, 3): each of (m, 3, 3) cut at the middles of its sides."""
     a, b, c = pieces[:, 0], pieces[:, 1], pieces[:, 2]
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)

@@ -11,12 +11,17 @@ from typing import Any
 import numpy as np
 
 from clamp3d.engine.model import QUICK_TRIANGLES, MeshModel, Model, box_corners
-from clamp3d.engine.overlap import Common, common, deepest
+from clamp3d.engine.overlap import Common, common, deepest, quartered
+from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
-from clamp3d.geometry.pose import Array, to_target
+from clamp3d.files.open_cascade import TOLERANCE
+from clamp3d.geometry.pose import Array, inverse, to_source, to_target
+from clamp3d.geometry.triangles import normals_and_areas
 
 _SHARE = 0.005
 """Relative width of the interval of the volume at which it is not refined further."""
+_PIECES = 40_000
+"""Triangles that those near another part are cut into at most, to bound their area."""
 _EXACT = 1e-5
 """Relative accuracy taken for a volume by Open CASCADE, beside what two integrations differ by."""
 
@@ -43,10 +48,14 @@ class Overlap:
     point: Array | None = None
 
     def refined(self, finer: Overlap) -> Overlap:
-        """Both answers at once; this one where they contradict each other: then some is lost in the other."""
-        low, high = max(self.volume[0], finer.volume[0]), min(self.volume[1], finer.volume[1])
+        """Both answers at once; this one where the other is less: then some is lost in it."""
         point = self.point if finer.point is None else finer.point
-        return self if low > high else replace(finer, volume=(low, high), point=point)
+        if finer.volume[1] < self.volume[0]:
+            return self
+        if finer.volume[0] > self.volume[1]:
+            return replace(finer, point=point)
+        low, high = max(self.volume[0], finer.volume[0]), min(self.volume[1], finer.volume[1])
+        return replace(finer, volume=(low, high), point=point)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -64,6 +73,7 @@ class Overlap:
 class Locator:
     """Two overlapping parts: ``b`` at ``T_ab`` (4, 4) in a's frame, ``a`` at ``T_a`` in the world.
 
+    ``attested`` (3,): a point in both of them, in a's frame.
     ``thorough``: large solids from CAD get the finest meshes where Open CASCADE finds no volume, not those of depths.
     """
 
@@ -72,6 +82,7 @@ class Locator:
     T_a: Array
     T_ab: Array
     thorough: bool = False
+    attested: Array | None = None
 
     @cached_property
     def overlap(self) -> Overlap | None:
@@ -85,6 +96,8 @@ class Locator:
             best = overlap if best is None else best.refined(overlap)
             if best.volume[1] - best.volume[0] <= _SHARE * best.volume[1]:
                 break
+        if best is not None and best.point is None and self.attested is not None:
+            return replace(best, point=to_target(self.T_a, self.attested))
         return best
 
     def _overlaps(self) -> Iterator[Overlap | None]:
@@ -116,14 +129,24 @@ class Locator:
         elif inner_a is not None and inner_b is not None:
             inner = common(inner_a, inner_b, self.T_ab)
         off = outer_a.error + outer_b.error
-        slack = (off + 1e-11 * (outer_a.scale + outer_b.scale)) * float(outer.areas[1].sum())
+        area = float(outer.areas[1].sum())
+        rounding = 1e-11 * (outer_a.scale + outer_b.scale) * area
+        slack = off * area + rounding
         low = 0.0 if inner is None else max(0.0, inner.volume - slack)
         point = None
         if inner is not None and inner_a is not None and inner_b is not None:
-            point = to_target(self.T_a, deepest(inner_a, inner_b, self.T_ab, inner)[1])
-        box = _box(to_target(self.T_a, outer.vertices), off)
+            depth, place = deepest(inner_a, inner_b, self.T_ab, inner)
+            point = to_target(self.T_a, place) if depth > 0.0 else None
+        # Of a ball that is larger by so much, and no larger than a part, the rim of a cap is further out by the root.
+        size = min(float(np.ptp(mesh.box, axis=0).max()) for mesh in (outer_a, outer_b))
+        box = _box(to_target(self.T_a, outer.vertices), off + float(np.sqrt(off * size)))
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
-        return Overlap((low, outer.volume + slack), box, unknown_error and off == 0.0, point)
+        # What of a part lies in the other is within its error of triangles that are within both errors of the other.
+        more = rounding
+        for own, other, T in ((outer_a, outer_b, self.T_ab), (outer_b, outer_a, inverse(self.T_ab))):
+            if own.error > 0.0:
+                more += own.error * _area_near(own, other, T, off)
+        return Overlap((low, outer.volume + more), box, unknown_error and off == 0.0, point)
 
     def _exact(self) -> Overlap | None:
         """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
@@ -139,7 +162,23 @@ class Locator:
             return None
         corners = to_target(self.T_a, box_corners(shared.box))
         low, high = shared.volumes
-        return Overlap((low * (1.0 - _EXACT), high * (1.0 + _EXACT)), _box(corners))
+        return Overlap((low * (1.0 - _EXACT), high * (1.0 + _EXACT)), _box(corners, TOLERANCE))
+
+
+def _area_near(surface: Surface, other: Surface, T: Array, reach: float) -> float:
+    """Area (mm^2) of what of a surface may lie in another mesh, at ``T`` (4, 4), or within ``reach`` mm of it.
+
+    Triangles are quartered until they are small beside that, or many.
+    """
+    pieces = to_source(T, surface.vertices[surface.faces])
+    while True:
+        middles = pieces.mean(axis=1)
+        size = np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1)
+        is_near = (other.distance(middles) <= reach + size) | other.contains(middles)
+        pieces, size = pieces[is_near], size[is_near]
+        if 4 * len(pieces) > _PIECES or size.max(initial=0.0) <= reach:
+            return float(normals_and_areas(pieces)[1].sum())
+        pieces = quartered(pieces)
 
 
 def _box(points: Array, slack: float = 0.0) -> Array:

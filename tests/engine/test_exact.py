@@ -30,6 +30,7 @@ from clamp3d.files.pairs import Border, CommonPart, Nearest
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import rotation, to_target
+from clamp3d.geometry.shapes import sphere
 from tests.cad import ball, block, common_volume, cone, cut, first_solid, moved, ring, rod, shift, turn
 from tests.public.placed_pairs import placed_pair, random_pose
 
@@ -388,6 +389,64 @@ def test_a_distance_that_a_point_in_both_solids_contradicts_is_not_believed(monk
     verdict, distance = judge(a, b, np.eye(4), Distance(), Thresholds(), None)
     assert verdict.value == "contact"
     assert distance.lower <= -0.006 <= distance.upper
+
+
+@pytest.mark.parametrize("gap", [0.004, -0.3])
+def test_of_splines_no_distance_is_believed_that_meshes_contradict(gap, monkeypatch):
+    """Of a wavy face Open CASCADE may find a gap between two parts that is not the least, and does not say so."""
+    measure = cad_process.distance
+
+    def another(*pair):
+        nearest = measure(*pair)
+        return nearest._replace(distance=nearest.distance + 0.02, is_least=True)
+
+    monkeypatch.setattr(cad_process, "distance", another)
+    a, b = models("spline_under_plate", gap)
+    verdict, distance = judge(a, b, np.eye(4), Distance(), Thresholds(), None)
+    assert verdict.value == ("contact" if gap > 0.0 else "clash")
+    assert distance.lower <= gap <= distance.upper
+    if gap < 0.0:
+        depth = penetration(a, b, np.eye(4), distance)
+        assert depth.lower <= gap <= depth.upper
+
+
+@pytest.mark.parametrize("has_common_part", [True, False])
+def test_a_shallow_lens_has_its_volume_within_the_bounds_and_its_rim_in_the_box(has_common_part, monkeypatch):
+    if not has_common_part:
+        monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
+    radius, depth = 50.0, 0.05
+    half = depth / 2
+    volume, rim = 2.0 * np.pi * half**2 * (3.0 * radius - half) / 3.0, np.sqrt(2.0 * radius * half - half**2)
+    solids = models_of(ball(radius), ball(radius, 2.0 * radius - depth))
+    drawn = [model_of(sphere(radius), Counters())] * 2
+    places = np.eye(4), shift(z=2.0 * radius - depth)
+    for (a, b), T in zip((solids, drawn), places, strict=True):
+        overlap = Locator(a, b, np.eye(4), T).overlap
+        if overlap is None:  # the facets of the spheres do not meet
+            assert a is drawn[0]
+            continue
+        assert overlap.volume[0] <= volume <= overlap.volume[1]
+        assert (overlap.box[0, :2] <= -rim).all()
+        assert (overlap.box[1, :2] >= rim).all()
+
+
+def test_the_point_of_an_overlap_lies_in_both_parts():
+    outer, inner = cut(rod(43.2, -20, 20), rod(43.0, -21, 21)), cut(rod(43.014, -25, 25), rod(42.5, -26, 26))
+    shapes = [BrepSolid.of(first_solid(solid), "tube") for solid in (outer, inner)]
+    (row,) = check(Scene().add("outer", shapes[0]).add("inner", shapes[1], turn((0, 0, 1), 0.02))).pairs
+    assert row.verdict.value == "clash"
+    assert 43.0 - 1e-5 <= np.hypot(*row.where.point[:2]) <= 43.014 + 1e-5
+
+
+@pytest.mark.parametrize("splines", [False, True])
+def test_what_fills_a_void_is_not_contained(splines):
+    block_with_void = cut(block((-20, -20, -20), (20, 20, 20)), block((-7, -7, -7), (7, 7, 7)))
+    filler = block((-7.05, -7.05, -7.05), (7.05, 7.05, 7.05))
+    if splines:
+        filler = occ.BRepBuilderAPI_NurbsConvert(filler, True).Shape()
+    a, b = models_of(block_with_void, filler)
+    assert kind_of_overlap(a, b, np.eye(4), 0.01).value == "clash"
+    assert kind_of_overlap(b, a, np.eye(4), 0.01).value == "clash"
 
 
 def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
