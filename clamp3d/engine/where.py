@@ -137,9 +137,7 @@ class Locator:
         if inner is not None and inner_a is not None and inner_b is not None:
             depth, place = deepest(inner_a, inner_b, self.T_ab, inner)
             point = to_target(self.T_a, place) if depth > 0.0 else None
-        # Of a ball that is larger by so much, and no larger than a part, the rim of a cap is further out by the root.
-        size = min(float(np.ptp(mesh.box, axis=0).max()) for mesh in (outer_a, outer_b))
-        box = _box(to_target(self.T_a, outer.vertices), off + float(np.sqrt(off * size)))
+        box = self._box_around(outer, outer_a, outer_b)
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
         # What of a part lies in the other is within its error of triangles that are within both errors of the other.
         more = rounding
@@ -147,6 +145,21 @@ class Locator:
             if own.error > 0.0:
                 more += own.error * _area_near(own, other, T, off)
         return Overlap((low, outer.volume + more), box, unknown_error and off == 0.0, point)
+
+    def _box_around(self, shared: Common, a: Surface, b: Surface) -> Array:
+        """Box (2, 3) in the world of all that the bodies share whose meshes share ``shared``.
+
+        A ball that is larger by e than its mesh has the rim of a cap further out by no more than the root of e times
+        its size. So has what bulges less.
+        """
+        off, size = a.error + b.error, min(float(np.ptp(mesh.box, axis=0).max()) for mesh in (a, b))
+        boxes = [
+            _box(to_target(self.T_a, shared.vertices), off + float(np.sqrt(off * size))),
+            _box(to_target(self.T_a, a.vertices), a.error),
+            _box(to_target(self.T_a @ self.T_ab, b.vertices), b.error),
+        ]
+        lows, highs = np.swapaxes(boxes, 0, 1)
+        return np.array([lows.max(axis=0), highs.min(axis=0)])
 
     def _exact(self) -> Overlap | None:
         """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
