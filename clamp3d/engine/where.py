@@ -94,7 +94,7 @@ class Locator:
             if overlap is None:
                 continue
             best = overlap if best is None else best.refined(overlap)
-            if best.volume[1] - best.volume[0] <= _SHARE * best.volume[1]:
+            if best.volume[1] - best.volume[0] <= _SHARE * best.volume[1] < np.inf:
                 break
         if best is not None and best.point is None and self.attested is not None:
             return replace(best, point=to_target(self.T_a, self.attested))
@@ -107,8 +107,9 @@ class Locator:
             yield self._exact()
             return
         chords = sorted({chord for model in models for chord in model.chords}, reverse=True)
-        yield self._at(chords[0])
-        yield self._exact()
+        exact = self._exact()
+        yield self._at(chords[0], exact)
+        yield exact
         solids = [] if self.thorough else [model for model in models if model.exact is not None]
         is_large = sum(solid.fine_triangles for solid in solids) > QUICK_TRIANGLES
         finest = max(solid.fine_chord for solid in solids) if is_large else 0.0
@@ -116,8 +117,8 @@ class Locator:
             with suppress(Clamp3dError):  # of solids from CAD fine ones may take too long to make
                 yield self._at(chord)
 
-    def _at(self, chord: float) -> Overlap | None:
-        """From meshes of one chord error (mm)."""
+    def _at(self, chord: float, exact: Overlap | None = None) -> Overlap | None:
+        """From meshes of one chord error (mm); without an upper bound of the volume where the ``exact`` one serves."""
         outer_a, outer_b = self.a.outer(chord), self.b.outer(chord)
         outer = common(outer_a, outer_b, self.T_ab)
         if outer is None:
@@ -139,12 +140,20 @@ class Locator:
             point = to_target(self.T_a, place) if depth > 0.0 else None
         box = self._box_around(outer, outer_a, outer_b)
         unknown_error = any(isinstance(model, MeshModel) for model in (self.a, self.b))
-        # What of a part lies in the other is within its error of triangles that are within both errors of the other.
-        more = rounding
-        for own, other, T in ((outer_a, outer_b, self.T_ab), (outer_b, outer_a, inverse(self.T_ab))):
-            if own.error > 0.0:
-                more += own.error * _area_near(own, other, T, off)
-        return Overlap((low, outer.volume + more), box, unknown_error and off == 0.0, point)
+        high = np.inf
+        if exact is None or exact.volume[1] < low:
+            high = outer.volume + rounding + self._bulging(outer_a, outer_b)
+        return Overlap((low, high), box, unknown_error and off == 0.0, point)
+
+    def _bulging(self, a: Surface, b: Surface) -> float:
+        """How much more (mm^3) the bodies may share than their meshes.
+
+        What of one lies in the other is within its error of triangles that are within both errors of the other.
+        """
+        sides = ((a, b, self.T_ab), (b, a, inverse(self.T_ab)))
+        return sum(
+            own.error * _area_near(own, other, T, a.error + b.error) for own, other, T in sides if own.error > 0.0
+        )
 
     def _box_around(self, shared: Common, a: Surface, b: Surface) -> Array:
         """Box (2, 3) in the world of all that the bodies share whose meshes share ``shared``.
