@@ -176,10 +176,9 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, thoro
     depth = max(depth, _reached(a, b, meshes))
     length, direction = _way_by_meshes(meshes, depth)
     way = Distance(-length, -depth, normal=direction, method="meshes (FCL)")
-    is_free_form = a.is_free_form or b.is_free_form  # of which Open CASCADE may say too large a gap
     is_costly = a.exact is not None and b.exact is not None and not thorough
     for _ in range(_EXACT_ADVANCES if is_costly else _ADVANCES):
-        if is_free_form or _is_long(way, meshes) or -way.lower <= _TIGHT * -way.upper:
+        if _is_long(way, meshes) or -way.lower <= _TIGHT * -way.upper:
             break
         shorter = _shortened(a, b, meshes.T, -way.lower * direction, _EDGE_PAIRS if is_costly else np.inf)
         upper = min(shorter.upper, way.upper)
@@ -215,6 +214,8 @@ def _shortened(a: Model, b: Model, T: Array, way: Array, most: float) -> Distanc
     moved[:3, 3] += way
     length = float(np.linalg.norm(way))
     if a.exact is not None and b.exact is not None:
+        if a.is_free_form or b.is_free_form:  # of which Open CASCADE may say too large a gap
+            return Distance()
         try:
             gap = exact_distance(a, b, moved, most)
         except Clamp3dError:

@@ -81,18 +81,27 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
 
 def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
     """What meshes and Open CASCADE say of two solids from CAD: coarse meshes, points, and then what takes longer."""
-    from clamp3d.engine.exact import exact_probe
+    from clamp3d.engine.exact import exact_distance, exact_probe
 
     chords = [chord for chord in a.chords if chord in b.chords]
     for chord in chords[:1]:
         yield "meshes", _by_meshes(a, b, T, chord, enough)
     probe = exact_probe(a, b, T)
     yield "exact", probe
-    yield from _exact_distances(a, b, T, probe.upper, enough)
     attested, finer = -probe.upper, chords[1:]
     is_small = bool(finer) and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
-    if attested <= _COINCIDENT and is_small:
-        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
+    distance = exact_distance(a, b, T)
+    unproven = replace(distance, lower=-np.inf)
+    # A point that lies in both solids contradicts what Open CASCADE says of them now and then.
+    distance = unproven if distance.lower > probe.upper else distance
+    # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
+    is_doubtful = bool(chords) and np.isfinite(distance.lower) and (a.is_free_form or b.is_free_form)
+    yield "exact", unproven if is_doubtful else distance
+    if is_doubtful or (attested <= _COINCIDENT and is_small):
+        meshes = _by_meshes(a, b, T, finer.pop() if is_small else max(a.fine_chord, b.fine_chord), enough)
+        yield "meshes", meshes
+        if is_doubtful and distance.lower <= meshes.upper:
+            yield "exact", distance
     is_found = False
     for overlap in _common_parts(a, b, T, attested, quick=True):
         yield "exact", overlap
@@ -108,30 +117,6 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
     if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
         yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
-
-
-def _exact_distances(a: Model, b: Model, T: Array, most: float, enough: Enough) -> Iterator[tuple[str, Distance]]:
-    """What Open CASCADE says of a distance that is at most ``most`` mm; of free-form faces after fine meshes.
-
-    Of these it may miss where they are nearest, or where they meet. So meshes must not contradict it, nor a point that
-    lies in both solids.
-    """
-    from clamp3d.engine.exact import exact_distance
-
-    distance = exact_distance(a, b, T)
-    unproven = replace(distance, lower=-np.inf)
-    if distance.lower > most:
-        yield "exact", unproven
-    elif distance.lower == -np.inf or not (a.is_free_form or b.is_free_form):
-        yield "exact", distance
-    else:
-        yield "exact", unproven
-        is_small = a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
-        chord = min(a.chords[-1], b.chords[-1]) if is_small else max(a.fine_chord, b.fine_chord)
-        meshes = _by_meshes(a, b, T, chord, enough)
-        yield "meshes", meshes
-        if distance.lower <= meshes.upper:
-            yield "exact", distance
 
 
 def _common_parts(a: Model, b: Model, T: Array, attested: float, *, quick: bool) -> Iterator[Distance]:

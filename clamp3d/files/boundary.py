@@ -69,7 +69,7 @@ class Boundary:
         face, uv = next(explore(search.SupportOnShape1(number), "FACE")), np.array(search.ParOnFaceS1(number))
         surface = occ.BRepAdaptor_Surface(face)
         if surface.GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface and self.is_near_pole(foot.point):
-            nearer = _polished(surface, uv, point)
+            nearer = _nearest_parameters(surface, uv, point)
             place = np.array(surface.Value(*nearer.tolist()).Coord())
             if (distance := float(np.linalg.norm(place - point))) < foot.distance:
                 foot, uv = Foot(distance, place, None), nearer
@@ -120,7 +120,7 @@ def vertex(point: Array) -> Any:
     return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
 
 
-def _polished(surface: Any, uv: Array, point: Array) -> Array:
+def _nearest_parameters(surface: Any, uv: Array, point: Array) -> Array:
     """Parameters (2,) of what of a BRepAdaptor_Surface is nearest to a point (3,), near ``uv`` (2,).
 
     Near a pole those that Open CASCADE finds are off by up to a hundredth.

@@ -410,6 +410,15 @@ def test_of_splines_no_distance_is_believed_that_meshes_contradict(gap, monkeypa
         assert depth.lower <= gap <= depth.upper
 
 
+def test_splines_without_triangles_that_close_are_measured_by_open_cascade_alone():
+    a, b = models("spline_under_plate", 0.05)
+    for model in (a, b):
+        model.__dict__["chords"] = ()
+    verdict, distance = judge(a, b, np.eye(4), Distance(), Thresholds(), None)
+    assert verdict.value == "clear"
+    assert distance.lower <= 0.05 <= distance.upper
+
+
 @pytest.mark.parametrize("has_common_part", [True, False])
 def test_a_shallow_lens_has_its_volume_within_the_bounds_and_its_rim_in_the_box(has_common_part, monkeypatch):
     if not has_common_part:
