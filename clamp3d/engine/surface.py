@@ -136,16 +136,18 @@ class Surface:
         if not len(rows):
             return np.asarray(inside)
         near = np.ascontiguousarray(points[rows], dtype=np.float64)
-        behind, is_certain = self._behind_nearest(near)
-        if not is_certain.all():
-            turns = winding_numbers(self.vertices, self.faces, near[~is_certain])
-            behind[~is_certain] = np.abs(turns) > 0.5
+        behind, is_certain, away = self._behind_nearest(near)
+        is_far = self._has_sides & (away > _FAR * self.scale)
+        for rounded in (False, True):
+            some = ~is_certain & (is_far == rounded)
+            turns = winding_numbers(self.vertices, self.faces, near[some], rounded=rounded)
+            behind[some] = np.abs(turns) > 0.5
         inside[rows] = behind
         return np.asarray(inside)
 
-    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether points (k, 3) are behind the triangle nearest to them, and whether it is nearest in its middle."""
-        _, face, foot = self.nearest(points)
+    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array]:
+        """Whether points (k, 3) are behind the triangle nearest to them, and nearest to its middle; how far from it."""
+        distance, face, foot = self.nearest(points)
         corners = self.vertices[self.faces[face]]
         normal = self.normals[face]
         sides = np.roll(corners, -1, axis=1) - corners
@@ -153,7 +155,7 @@ class Surface:
         margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
         away = np.einsum("ki,ki->k", points - foot, normal)
         is_certain = self._has_sides & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
-        return away < 0.0, np.asarray(is_certain)
+        return away < 0.0, np.asarray(is_certain), distance
 
     @cached_property
     def _has_sides(self) -> bool:
@@ -175,7 +177,7 @@ class Surface:
             return np.zeros(len(triangles), dtype=bool)
         outside = np.ones(len(triangles), dtype=bool)
         outside[[contact.b1 for contact in result.contacts]] = False
-        behind, is_certain = self._behind_nearest(triangles[outside].mean(axis=1))
+        behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
         outside[outside] = is_certain & ~behind
         return outside
 
@@ -201,6 +203,8 @@ _CONTACTS = 100
 """Contacts of each triangle that FCL lists at most, so that its answer does not fill the memory."""
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
+_FAR = 1e-4
+"""Distance from the surface, relative to its size, at which single precision tells inside from outside."""
 
 
 def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:

@@ -193,13 +193,18 @@ def _area_near(surface: Surface, other: Surface, T: Array, reach: float) -> floa
     Triangles are quartered until they are small beside that, or many.
     """
     pieces = to_source(T, surface.vertices[surface.faces])
+    area_inside = 0.0
     while True:
         middles = pieces.mean(axis=1)
         size = np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1)
-        is_near = (other.distance(middles) <= reach + size) | other.contains(middles)
+        gaps = np.maximum(other.box[0] - middles, middles - other.box[1]).max(axis=1)
+        pieces, middles, size = (x[gaps <= reach + size] for x in (pieces, middles, size))
+        is_near = other.distance(middles) <= reach + size
+        beyond = pieces[~is_near]
+        area_inside += float(normals_and_areas(beyond[other.contains(middles[~is_near])])[1].sum())
         pieces, size = pieces[is_near], size[is_near]
         if 4 * len(pieces) > _PIECES or size.max(initial=0.0) <= reach:
-            return float(normals_and_areas(pieces)[1].sum())
+            return area_inside + float(normals_and_areas(pieces)[1].sum())
         pieces = quartered(pieces)
 
 
