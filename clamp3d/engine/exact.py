@@ -17,7 +17,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.pairs import CommonPart
+from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
@@ -108,18 +108,13 @@ def exact_overlap(
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    points, at_most = _depth_bounds(shared)
-    order = np.argsort(-at_most, kind="stable")
-    spread = order[np.linspace(0, len(order) - 1, _PROBED).round().astype(int)]
-    tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    depths = depths_in(a, b, T, points[tried])
-    at_most[tried] = np.abs(depths).max(axis=0)
-    # Between the points the border is within a chord of straight lines, so nothing is much deeper. Some of what
-    # Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
-    most = float(at_most.max()) + shared.chord + max(0.0, -float(depths.min()))
+    points, at_most = _deepest_places(shared)
+    depths = depths_in(a, b, T, points)
+    # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
+    most = at_most + max(0.0, -float(depths.min()))
     if most + TOLERANCE < attested:  # some of it is missing
         return unknown
-    return replace(attested_overlap(points[tried], depths), lower=-most - TOLERANCE)
+    return replace(attested_overlap(points, depths), lower=-most - TOLERANCE)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:
@@ -140,14 +135,43 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     return Distance(-_NARROW, level="exact", method=METHOD)
 
 
-def _depth_bounds(shared: CommonPart) -> tuple[Array, Array]:
-    """Points (n, 3) of a common part's border, and how deep (n,) mm each can lie in the other solid.
+def _deepest_places(shared: CommonPart) -> tuple[Array, float]:
+    """Points (n, 3) of a common part's border that look deepest, with some of all others, and a bound (mm) of any.
 
-    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
+    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that than from
+    any one of its faces.
     """
     on_a, on_b = shared.borders
-    depths = []
-    for own, other in ((on_a, on_b), (on_b, on_a)):
-        surface = Surface(other.points, other.triangles)
-        depths.append(surface.distance(own.points) if len(other.points) else np.full(len(own.points), np.inf))
-    return np.vstack([on_a.points, on_b.points]), np.concatenate(depths) + shared.chord
+    (points_a, depths_a, most_a), (points_b, depths_b, most_b) = _depths_on(on_a, on_b), _depths_on(on_b, on_a)
+    order = np.argsort(-np.concatenate([depths_a, depths_b]), kind="stable")
+    spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
+    tried = np.unique(np.concatenate([order[:_PROBED], spread]))
+    return np.concatenate([points_a, points_b])[tried], max(most_a, most_b)
+
+
+def _depths_on(own: Border, other: Border) -> tuple[Array, Array, float]:
+    """Corners and middles (n, 3) of a border's triangles, their distances (n,) from another, and how far (mm) any is.
+
+    From a face that is flat or nearly so, and that a triangle is above, a corner is farthest. From all of the other
+    border the corners may be less far than what is between them: those of a slab are at its walls. So the bound of a
+    triangle is the least that any face gives; once it is all but as little as the farthest middle it serves.
+    """
+    middles = own.points[own.triangles].mean(axis=1)
+    points = np.concatenate([own.points, middles])
+    if not (len(own.triangles) and len(other.triangles)):
+        return points, np.full(len(points), np.inf), np.inf if len(own.triangles) else 0.0
+    surface = Surface(other.points, other.triangles)
+    away, nearest, _ = surface.nearest(middles)
+    at_most = np.full(len(middles), np.inf)
+    serves = float((away + own.errors + other.errors[nearest]).max())
+    faces, count = np.unique(other.face[nearest], return_counts=True)
+    for face in faces[np.argsort(-count, kind="stable")]:
+        of_face = other.face == face
+        ends = other.points[other.triangles[of_face]].reshape(-1, 3)
+        gaps = np.maximum(ends.min(axis=0) - middles, middles - ends.max(axis=0)).max(axis=1)
+        rows = np.flatnonzero((at_most > serves) & (gaps <= serves))
+        corners, corner_of = np.unique(own.triangles[rows], return_inverse=True)
+        far = Surface(other.points, other.triangles[of_face]).distance(own.points[corners])
+        bound = far[corner_of.reshape(-1, 3)].max(axis=1) + own.errors[rows] + other.errors[of_face].max()
+        at_most[rows] = np.minimum(at_most[rows], bound)
+    return points, np.concatenate([surface.distance(own.points), away]), max(serves, float(at_most.max()))

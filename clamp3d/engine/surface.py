@@ -166,8 +166,8 @@ class Surface:
         """Which of triangles (m, 3, 3) certainly have no point in common with the closed body."""
         import fcl
 
-        if not len(triangles):
-            return np.empty(0, dtype=bool)
+        if not (len(triangles) and self._has_sides):
+            return np.zeros(len(triangles), dtype=bool)
         corners = np.ascontiguousarray(triangles.reshape(-1, 3))
         loose = fcl_tree(corners, np.arange(len(corners)).reshape(-1, 3))
         most = _CONTACTS * len(triangles)

@@ -28,6 +28,7 @@ from clamp3d.files.open_cascade import (
 from clamp3d.files.tessellation import ANGLE, SAMPLED, covers, edge_middles, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
+from clamp3d.geometry.triangles import normals_and_areas
 
 _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
@@ -49,25 +50,29 @@ _MOST_SAMPLES = 100_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Border:
-    """What of a common part's border lies on one solid, as triangles: ``points`` (n, 3), ``triangles`` (m, 3)."""
+    """What of a common part's border lies on one solid, as triangles: ``points`` (n, 3), ``triangles`` (m, 3).
+
+    ``face`` (m,): the number of the common part's face that each is on; ``errors`` (m,): how far (mm) it is from it.
+    """
 
     points: Array
     triangles: IntArray
+    face: IntArray
+    errors: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonPart:
     """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
 
-    ``borders``, if any, are on the first and on the second solid, within ``chord`` mm of their triangles; without them
-    ``volumes`` is the volume by two integrations, the smaller first.
+    ``borders``, if any, are on the first and on the second solid; without them ``volumes`` is the volume by two
+    integrations, the smaller first.
     """
 
     volume: float
     area: float
     box: Array
     borders: tuple[Border, ...] = ()
-    chord: float = 0.0
     volumes: tuple[float, float] = (0.0, 0.0)
 
 
@@ -203,20 +208,22 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
     meshes = _meshed(shape, sag)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
-    sides: tuple[list[tuple[Array, IntArray]], ...] = ([], [])
-    chord = sag
-    for face, mesh in zip(explore(shape, "FACE"), meshes, strict=True):
+    sides: tuple[list[Border], ...] = ([], [])
+    for number, (face, mesh) in enumerate(zip(explore(shape, "FACE"), meshes, strict=True)):
         uv, off = _samples(face, *mesh, sag)
         if not len(uv):
             continue
-        chord = max(chord, SAMPLED * off)
-        (middle,) = points_on(face, uv[len(uv) // 2].mean(axis=0, keepdims=True))
-        away = [boundary.foot(middle).distance for boundary in boundaries]
         points, rows = distinct_points_on(face, uv.reshape(-1, 2))
+        triangles = rows.reshape(-1, 3)
+        border = Border(points, triangles, np.full(len(triangles), number), np.full(len(triangles), SAMPLED * off))
+        _, areas = normals_and_areas(points[triangles])
+        # Beside its border a face may be as near to the other solid's as to its own.
+        (middle,) = points_on(face, uv[areas.argmax()].mean(axis=0, keepdims=True))
+        away = [boundary.foot(middle).distance for boundary in boundaries]
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
-                side.append((points, rows.reshape(-1, 3)))
-    return CommonPart(volume, area, box, tuple(map(_joined, sides)), chord)
+                side.append(border)
+    return CommonPart(volume, area, box, tuple(map(_joined, sides)))
 
 
 def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
@@ -239,12 +246,17 @@ def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
     raise Clamp3dError("Open CASCADE leaves out some of a face of the common part of the two solids")
 
 
-def _joined(side: list[tuple[Array, IntArray]]) -> Border:
-    """Samples of some faces as one."""
-    starts = np.cumsum([0, *(len(points) for points, _ in side)])
-    triangles = [rows + start for (_, rows), start in zip(side, starts, strict=False)]
-    no_rows = np.empty((0, 3), dtype=np.int64)
-    return Border(np.vstack([np.empty((0, 3)), *(points for points, _ in side)]), np.vstack([no_rows, *triangles]))
+def _joined(side: list[Border]) -> Border:
+    """The samples of some faces as one."""
+    if not side:
+        return Border(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
+    starts = np.cumsum([0, *(len(border.points) for border in side[:-1])])
+    return Border(
+        np.vstack([border.points for border in side]),
+        np.vstack([border.triangles + start for border, start in zip(side, starts, strict=True)]),
+        np.concatenate([border.face for border in side]),
+        np.concatenate([border.errors for border in side]),
+    )
 
 
 @lru_cache(maxsize=512)

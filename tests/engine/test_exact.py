@@ -14,7 +14,7 @@ from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import penetration
-from clamp3d.engine.exact import _depth_bounds, attested_overlap, exact_distance, exact_overlap, exact_probe
+from clamp3d.engine.exact import _deepest_places, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import CAD_CHORDS, Counters, model_of
 from clamp3d.engine.near_faces import near_faces
@@ -26,7 +26,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process, pairs
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
 from clamp3d.files.open_cascade import moved as occ_moved
-from clamp3d.files.pairs import Border, CommonPart, Nearest
+from clamp3d.files.pairs import CommonPart, Nearest
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import rotation, to_target
@@ -201,11 +201,21 @@ def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family,
     part = cad_process.common(a.exact.brep, turned, T, 0.5)
     for model, border in zip((a, b), part.borders, strict=True):
         middles = border.points[border.triangles].mean(axis=1)[::9]
-        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= part.chord
-    points, at_most = _depth_bounds(part)
-    rows = np.linspace(0, len(points) - 1, 60).astype(int)
-    depths = [np.abs(cad_process.depths(model.exact.brep, points[rows])) for model in (a, b)]
-    assert (at_most[rows] >= np.maximum(*depths) - 1e-9).all()
+        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= border.errors.max()
+    _, at_most = _deepest_places(part)
+    for model, border in zip((b, a), part.borders, strict=True):  # the depth of one in the other
+        middles = border.points[border.triangles].mean(axis=1)[::9]
+        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= at_most
+
+
+@pytest.mark.parametrize("share", [0.04, 0.015, 0.004])
+def test_between_the_corners_of_its_triangles_a_border_may_be_deepest(share):
+    """The overlap of two plates drilled alike: on the border of every face both plates end, by the walls of a hole."""
+    a, b = models("plates_drilled_alike", -0.006)
+    for T in (np.eye(4), random_pose(np.random.default_rng(1))):
+        turned = model_of(BrepSolid.of(moved(from_bytes(b.exact.brep), np.linalg.inv(T)), "b"), Counters())
+        distance = exact_overlap(a, turned, T, share)
+        assert -0.007 <= distance.lower <= -0.006 <= distance.upper <= -0.00599
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3])
@@ -249,8 +259,8 @@ def test_fine_triangles_that_do_not_close_are_not_taken(monkeypatch):
 def test_a_common_part_beside_the_solids_widens_the_bounds(monkeypatch):
     a, b = models("boxes_face_to_face", -0.06)
     part = cad_process.common(a.exact.brep, b.exact.brep, np.eye(4), 0.04)
-    sides = tuple(Border(side.points + 500.0, side.triangles) for side in part.borders)
-    moved = CommonPart(part.volume, part.area, part.box, sides, part.chord)
+    sides = tuple(replace(side, points=side.points + 500.0) for side in part.borders)
+    moved = replace(part, borders=sides)
     monkeypatch.setattr(cad_process, "common", lambda *_: moved)
     distance = exact_overlap(a, b, np.eye(4), 0.04)
     assert distance.lower <= -400.0  # nothing is known of it
