@@ -114,7 +114,7 @@ def kernel_distance(answer: SignedDistance) -> Distance:
     """The kernel's answer as a `Distance` in the groove's frame."""
     d, e = answer.distance, answer.error_bound
     p, q = answer.point_on_groove, answer.point_on_cylinder
-    return Distance(d - e, d + e, p, q, answer.normal, None, "features", "groove kernel")
+    return Distance(d - e, d + e, p, q, answer.normal, method="groove kernel")
 
 
 def bore_rod(bore: Bore, rod: Rod | Ball, T: Array) -> Distance:

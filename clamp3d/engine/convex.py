@@ -177,7 +177,7 @@ def _apart(a: Convex, Ta: Array, b: Convex, Tb: Array, p: Array, q: Array) -> Di
     if size - low > 1e-5:  # the direction of a short distance is mostly rounding
         low, normal = _slab(a, Ta, b, Tb, np.vstack([near, face_normals(a, Ta, b, Tb)]))
     outside = max(0.0, -_depth(a, Ta, p), -_depth(b, Tb, q))
-    return Distance(low, size + 2.0 * outside, p, q, normal, None, "features", "convex")
+    return Distance(low, size + 2.0 * outside, p, q, normal, method="convex")
 
 
 def _overlapping(a: Convex, Ta: Array, b: Convex, Tb: Array, pair: tuple[Any, Any]) -> Distance:
@@ -199,7 +199,7 @@ def _overlapping(a: Convex, Ta: Array, b: Convex, Tb: Array, pair: tuple[Any, An
         return Distance(low, normal=normal, method="convex")
     k = int(np.argmax(np.where(inside, np.maximum(in_a, in_b), -np.inf)))
     upper = 4.0 * max(0.0, -float(min(in_a[k], in_b[k]))) - max(0.0, float(max(in_a[k], in_b[k])))
-    return Distance(low, max(low, upper), trials[k], trials[k], normal, None, "features", "convex")
+    return Distance(low, max(low, upper), trials[k], trials[k], normal, method="convex")
 
 
 def face_normals(a: Convex, Ta: Array, b: Convex, Tb: Array) -> Array:

@@ -77,7 +77,7 @@ def depth_of_pieces(a: Model, b: Model, T: Array) -> Distance | None:
     if pieces is None:
         return None
     distance = convex_depth(pieces[0], np.eye(4), pieces[1], T).widened(2.0 * _EXACT if a.exact or b.exact else 0.0)
-    return distance if distance.upper <= 0.0 else None
+    return replace(distance, level="features") if distance.upper <= 0.0 else None
 
 
 def penetration(a: Model, b: Model, T: Array, distance: Distance, *, thorough: bool = False) -> Distance:

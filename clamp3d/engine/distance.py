@@ -64,8 +64,8 @@ def distance(
     --------
     >>> from clamp3d.geometry import shapes
     >>> from clamp3d.geometry.pose import translation
-    >>> found = distance(shapes.box((10, 10, 10)), shapes.cylinder(3, 10), translation(0, 0, 12))
-    >>> round(found.value, 9), (found.normal.round(9) + 0.0).tolist()
+    >>> gap = distance(shapes.box((10, 10, 10)), shapes.cylinder(3, 10), translation(0, 0, 12))
+    >>> round(gap.value, 9), (gap.normal.round(9) + 0.0).tolist()
     (2.0, [0.0, 0.0, 1.0])
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
@@ -193,7 +193,7 @@ def _measured(a: Model, b: Model, T: Array, accuracy: float, model: ContactModel
     if exact_depth is not None and exact_depth.upper < -ACCURACY:
         return exact_depth
     wide = accuracy_for(a, b, accuracy)
-    distance = with_normal(refine(a, b, T, from_boxes(a, b, T), lambda known: measured(known, wide)))
+    distance = with_normal(refine(a, b, T, from_boxes(a, b, T), lambda answer: measured(answer, wide)))
     if model is not None and (by_model := modelled(a, b, T, distance, model)) is not distance:
         return by_model
     return penetration(a, b, T, distance) if distance.lower < -ACCURACY else distance

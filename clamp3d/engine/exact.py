@@ -41,7 +41,7 @@ def exact_distance(a: Model, b: Model, T: Array, most: float = np.inf) -> Distan
     gap, way = nearest.distance, nearest.q - nearest.p
     lower = gap - TOLERANCE if nearest.is_least and (gap > TOLERANCE or nearest.is_signed) else -np.inf
     normal = way / np.linalg.norm(way) if lower > 0.0 else None
-    return Distance(lower, gap + TOLERANCE, nearest.p, nearest.q, normal, None, "exact", METHOD)
+    return Distance(lower, gap + TOLERANCE, nearest.p, nearest.q, normal, method=METHOD)
 
 
 def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_each: int = _PROBED) -> Distance:
@@ -51,7 +51,7 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     ``chord``: chord error (mm) of the meshes, that of the coarsest by default. ``points_each``: points that look
     deepest in one solid, and in both.
     """
-    nothing = Distance(level="exact", method=METHOD)
+    nothing = Distance(method=METHOD)
     if not (a.chords and b.chords):
         return nothing
     meshes = [model.outer(min(model.chords[0], chord), thorough=True) for model in (a, b)]
@@ -75,7 +75,7 @@ def attested_overlap(points: Array, depths: Array) -> Distance:
     beside = np.minimum(depths.min(axis=0), 0.0)  # by so much it is moved into both solids, and less deep
     overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, -np.inf)
     k = int(np.argmax(overlaps))
-    return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], None, None, "exact", METHOD)
+    return Distance(-np.inf, TOLERANCE - float(overlaps[k]), points[k], points[k], method=METHOD)
 
 
 def exact_height(inner: Surface, outer: Surface, solid: Model, T: Array) -> float:
@@ -100,7 +100,7 @@ def exact_overlap(
     """
     assert a.exact is not None
     assert b.exact is not None
-    unknown = Distance(level="exact", method=f"{METHOD}, without a common part")
+    unknown = Distance(method=f"{METHOD}, without a common part")
     try:
         find = cad_process.quick_common if quick else cad_process.common
         shared = find(a.exact.brep, b.exact.brep, T, share)
@@ -123,7 +123,7 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     It misses those between round faces that are nearly tangent: of a ball and a ring one of 0.014 mm was seen. No proof
     that there is none, so `_NARROW` is allowed for: one so deep is wider than the facets of the meshes looked at.
     """
-    unknown = Distance(level="exact", method=f"{METHOD}, without a common part")
+    unknown = Distance(method=f"{METHOD}, without a common part")
     if attested > _FAINT:
         return unknown
     try:
@@ -132,7 +132,7 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
         return unknown
     if -deepest.upper > _FAINT:
         return replace(deepest, method=unknown.method)
-    return Distance(-_NARROW, level="exact", method=METHOD)
+    return Distance(-_NARROW, method=METHOD)
 
 
 def _deepest_places(shared: CommonPart) -> tuple[Array, float]:

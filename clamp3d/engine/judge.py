@@ -45,8 +45,7 @@ def judge(
     if shallow or (verdict is Verdict.UNCERTAIN and distance.upper < thresholds.reach):
         exact = depth_of_pieces(a, b, T)  # known, the depth decides; else the interference, which is no more
         if exact is not None:
-            distance = replace(exact, level="features")
-            verdict = thresholds.verdict(distance, allowance)
+            distance, verdict = exact, thresholds.verdict(exact, allowance)
     if verdict is Verdict.CLASH:
         verdict = kind_of_overlap(a, b, T, thresholds.contact)
     return verdict, distance

@@ -138,7 +138,7 @@ def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, th
     try:
         return meshes_distance(a, b, T, chord, enough, thorough=thorough, cuts=CUTS if thorough else FEW_CUTS)
     except Clamp3dError:
-        return Distance(level="meshes", method="without fine meshes")
+        return Distance(method="without fine meshes")
 
 
 def _is_round(model: Model) -> bool:
