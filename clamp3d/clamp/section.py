@@ -153,7 +153,8 @@ class Section:
 
     def down_splint(self, q: Array) -> SectionPose:
         """P2 seen from P1."""
-        return SectionPose(self.bolt_x + q[[B, V, W]].sum(), q[D] - q[U], q[S] / self.lever)
+        shifts, (d, s, u) = q[[B, V, W]].sum(), q[[D, S, U]].tolist()
+        return SectionPose(self.bolt_x + float(shifts), d - u, s / self.lever)
 
     def poses(self, q: Array, saddle_d: float | None = None) -> dict[PartName, SectionPose]:
         """Section poses of all parts with the line at rest; ``saddle_d`` is where the saddle stands if not under P2."""
@@ -331,14 +332,14 @@ class Section:
         """The contact model's pieces of a groove for the wire or the round back that lies in it."""
         pair, frame = self.pairs[part, inside], down if part == "P2" else _AT_REST
         if inside == "P2":
-            body, frame = down, SectionPose(down.x - q[W], q[D] - self.clamp.back_clearance)
+            frame = SectionPose(down.x - float(q[W]), float(q[D]) - self.clamp.back_clearance)
+            centre, angle = (down.x, down.y), down.angle
         else:
             self.queries += 1
             i = 2 * WIRES.index(inside)
-            body = SectionPose(q[i], q[i + 1])
-        centre = body.x, body.y
+            centre, angle = (float(q[i]), float(q[i + 1])), 0.0
         u, v = frame.local(*centre)
-        T = SectionPose(u, v, body.angle - frame.angle).T()
+        T = SectionPose(u, v, angle - frame.angle).T()
         pieces, r, R = self.model.pieces(pair, T), pair.cylinder.radius, pair.groove.radius
         rows = []
         points, normals = pieces.point.tolist(), pieces.normal.tolist()

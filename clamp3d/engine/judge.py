@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import depth_of_pieces
 from clamp3d.engine.exact import exact_height
-from clamp3d.engine.mesh_distance import within
+from clamp3d.engine.mesh_distance import is_deep_inside, within
 from clamp3d.engine.model import Model, box_corners
 from clamp3d.engine.refine import Enough, refine
 from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
@@ -87,6 +87,8 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
             continue
         # Meshes around and inside of drawn solids are off by their chords.
         slack = small.error + large.error + sum(m.chords[level] for m in (inner, outer) if m.bracketed)
+        if is_deep_inside(small, large, T, slack):  # finer meshes make no difference
+            return True
         if not within(small, large, T, contact + slack):
             return False
     if large is None:

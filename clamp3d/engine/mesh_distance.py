@@ -170,3 +170,10 @@ def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     # what fills a void has these on its walls too, but not what is inside.
     beneath = Common(corners, faces).inner_points() if len(faces) else corners
     return bool((outer.distance(np.vstack([corners, corners[faces].mean(axis=1), beneath])) <= slack).all())
+
+
+def is_deep_inside(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
+    """Whether all of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``, by more than ``slack`` mm."""
+    if tree_distance(outer.bvh, inner.bvh, T) <= slack:
+        return False
+    return bool((inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold).is_empty())

@@ -340,7 +340,7 @@ class SectionPose:
 
     def T(self) -> Array:
         """World pose (4, 4) of the part."""
-        c, s = np.cos(self.angle), np.sin(self.angle)
+        c, s = math.cos(self.angle), math.sin(self.angle)
         return np.array([[c, 0.0, -s, self.x], [0.0, 1.0, 0.0, self.along], [s, 0.0, c, -self.y], [0.0, 0.0, 0.0, 1.0]])
 
     def point(self, u: float, v: float) -> tuple[float, float]:

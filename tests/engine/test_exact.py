@@ -77,7 +77,7 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
 
 
-@pytest.mark.parametrize("family", ["cones_side_by_side", "ball_in_cone", "ball_in_ring"])
+@pytest.mark.parametrize("family", ["cones_side_by_side", "ball_in_cone"])
 def test_where_every_distance_is_measured_depths_of_oblique_contacts_are_tighter(family):
     pair = placed_pair(family, np.random.default_rng(3), -0.04, splines=0.0)
     scene = Scene()
@@ -97,7 +97,7 @@ def test_a_shared_volume_holds_where_open_cascade_integrates_badly():
     tube = cut(rod(10.0, 0.0, 20.0), rod(7.0, -5.0, 35.0, 1.0))
     tube = first_solid(occ.BRepBuilderAPI_GTransform(tube, squeeze, True).Shape())
     scene = Scene().add("block", BrepSolid.of(block((-50, -50, -50), (50, 50, 50)), "block"))
-    (row,) = check(scene.add("tube", BrepSolid.of(tube, "tube"))).pairs
+    (row,) = check(scene.add("tube", BrepSolid.of(tube, "tube")), depths=False).pairs
     low, high = row.where.volume
     assert low <= 1.7 * 0.6 * np.pi * (10.0**2 - 7.0**2) * 20.0 <= high <= 1.02 * low
 
@@ -144,7 +144,7 @@ def test_the_faces_that_are_near_tell_the_distance_of_the_solids(angle):
 def test_a_wire_between_a_solid_and_its_triangles_is_inside_it(monkeypatch):
     monkeypatch.setattr(near_faces_module, "_FEW", 0)
     hidden = 0
-    for angle in np.radians(np.arange(0.0, 10.0)):
+    for angle in np.radians(np.arange(0.0, 10.0, 2.0)):
         wire = rod(0.01, 5.0, 15.0, 29.97 * np.cos(angle), 29.97 * np.sin(angle))
         a, b = models_of(drum(), wire)
         hidden += tree_distance(*(model.face_meshes.surface.bvh for model in (a, b)), np.eye(4)) > 0.0
@@ -466,6 +466,26 @@ def test_what_fills_a_void_is_not_contained(splines):
     a, b = models_of(block_with_void, filler)
     assert kind_of_overlap(a, b, np.eye(4), 0.01).value == "clash"
     assert kind_of_overlap(b, a, np.eye(4), 0.01).value == "clash"
+
+
+@pytest.mark.parametrize(("void", "verdict", "meshes"), [(0.0, "contained", 1), (0.1, "clash", 2)])
+def test_coarse_meshes_tell_what_is_deep_inside_but_not_that_it_fills_a_small_void(void, verdict, meshes):
+    outer = block((-20, -20, -20), (20, 20, 20))
+    a, b = models_of(cut(outer, ball(void)) if void else outer, ball(5.0))
+    assert kind_of_overlap(a, b, np.eye(4), 0.01).value == verdict
+    assert b.counters.built["meshes"] == meshes
+
+
+def test_coarse_meshes_do_not_tell_whether_a_part_is_inside_that_bulges_out_of_its_facets():
+    """Into a slot of the other that the facet itself is clear of."""
+    pin = rod(30.0, -8.0, 16.0)
+    (model,) = models_of(pin)
+    facets = model.outer(model.chords[0])
+    x, y, _ = facets.normals[np.abs(facets.normals[:, 2]) < 0.1][0]
+    assert (facets.vertices[facets.faces] @ (x, y, 0.0)).min(axis=1).max() < 29.97
+    slot = moved(block((29.98, -0.1, -1.0), (31.0, 0.1, 1.0)), turn((0, 0, 1), np.arctan2(y, x)))
+    a, b = models_of(cut(block((-40, -40, -20), (40, 40, 20)), slot), pin)
+    assert kind_of_overlap(a, b, np.eye(4), 0.001).value == "clash"
 
 
 def test_of_a_ball_whose_centre_is_inside_the_depth_is_not_told_by_its_radius():
