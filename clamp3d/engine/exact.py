@@ -108,10 +108,11 @@ def exact_overlap(
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    points, at_most = _deepest_places(shared)
+    corners, middles, at_most = _deepest_places(shared)
+    points = np.concatenate([corners, middles])
     depths = depths_in(a, b, T, points)
     # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
-    most = at_most + max(0.0, -float(depths.min()))
+    most = at_most + max(0.0, -float(depths[:, : len(corners)].min()))
     if most + TOLERANCE < attested:  # some of it is missing
         return unknown
     return replace(attested_overlap(points, depths), lower=-most - TOLERANCE)
@@ -135,31 +136,40 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     return Distance(-_NARROW, method=METHOD)
 
 
-def _deepest_places(shared: CommonPart) -> tuple[Array, float]:
-    """Points (n, 3) of a common part's border that look deepest, with some of all others, and a bound (mm) of any.
+def _deepest_places(shared: CommonPart) -> tuple[Array, Array, float]:
+    """Corners (n, 3) and middles (k, 3) of triangles of a common part's border, and how deep (mm) any point is at most.
 
+    They are those that look deepest, and some of all other corners. Middles need not lie on the border.
     Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that than from
     any one of its faces.
     """
     on_a, on_b = shared.borders
-    (points_a, depths_a, most_a), (points_b, depths_b, most_b) = _depths_on(on_a, on_b), _depths_on(on_b, on_a)
-    order = np.argsort(-np.concatenate([depths_a, depths_b]), kind="stable")
+    (corners_a, middles_a, most_a), (corners_b, middles_b, most_b) = _depths_on(on_a, on_b), _depths_on(on_b, on_a)
+    corners = np.concatenate([on_a.points, on_b.points])
+    middles = np.concatenate([_middles(on_a), _middles(on_b)])
+    order = np.argsort(-np.concatenate([corners_a, corners_b]), kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    return np.concatenate([points_a, points_b])[tried], max(most_a, most_b)
+    deepest = np.argsort(-np.concatenate([middles_a, middles_b]), kind="stable")[:_PROBED]
+    return corners[tried], middles[deepest], max(most_a, most_b)
+
+
+def _middles(border: Border) -> Array:
+    """The middles (m, 3) of its triangles."""
+    return np.asarray(border.points[border.triangles].mean(axis=1))
 
 
 def _depths_on(own: Border, other: Border) -> tuple[Array, Array, float]:
-    """Corners and middles (n, 3) of a border's triangles, their distances (n,) from another, and how far (mm) any is.
+    """How far corners (n,) and middles (m,) of a border's triangles are from another, and any point at most, mm.
 
     From a face that is flat or nearly so, and that a triangle is above, a corner is farthest. From all of the other
     border the corners may be less far than what is between them: those of a slab are at its walls. So the bound of a
     triangle is the least that any face gives; once it is all but as little as the farthest middle it serves.
     """
-    middles = own.points[own.triangles].mean(axis=1)
-    points = np.concatenate([own.points, middles])
+    middles = _middles(own)
     if not (len(own.triangles) and len(other.triangles)):
-        return points, np.full(len(points), np.inf), np.inf if len(own.triangles) else 0.0
+        unknown = np.inf if len(own.triangles) else 0.0
+        return np.full(len(own.points), unknown), np.full(len(middles), unknown), unknown
     surface = Surface(other.points, other.triangles)
     away, nearest, _ = surface.nearest(middles)
     at_most = np.full(len(middles), np.inf)
@@ -174,4 +184,4 @@ def _depths_on(own: Border, other: Border) -> tuple[Array, Array, float]:
         far = Surface(other.points, other.triangles[of_face]).distance(own.points[corners])
         bound = far[corner_of.reshape(-1, 3)].max(axis=1) + own.errors[rows] + other.errors[of_face].max()
         at_most[rows] = np.minimum(at_most[rows], bound)
-    return points, np.concatenate([surface.distance(own.points), away]), max(serves, float(at_most.max()))
+    return surface.distance(own.points), away, max(serves, float(at_most.max()))
