@@ -23,6 +23,8 @@ from clamp3d.geometry.pose import Array, to_source, to_target
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
+_ONE_SHEET = 0.9
+"""Least cosine of the angle of triangles that count as one smooth sheet: a fillet and the face that it ends in."""
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
 _NARROW, _HIDING = 9e-3, 0.01
@@ -162,26 +164,29 @@ def _middles(border: Border) -> Array:
 def _depths_on(own: Border, other: Border) -> tuple[Array, Array, float]:
     """How far corners (n,) and middles (m,) of a border's triangles are from another, and any point at most, mm.
 
-    From a face that is flat or nearly so, and that a triangle is above, a corner is farthest. From all of the other
-    border the corners may be less far than what is between them: those of a slab are at its walls. So the bound of a
-    triangle is the least that any face gives; once it is all but as little as the farthest middle it serves.
+    Over a smooth sheet a corner of a triangle is farthest, or its middle. Where the nearest triangles are not of one
+    sheet, the corners may be less far than what is between them: those of a slab are at its walls. There the bound is
+    the least that any face by itself gives; once it is all but as little as the farthest middle it serves.
     """
     middles = _middles(own)
     if not (len(own.triangles) and len(other.triangles)):
         unknown = np.inf if len(own.triangles) else 0.0
         return np.full(len(own.points), unknown), np.full(len(middles), unknown), unknown
     surface = Surface(other.points, other.triangles)
-    away, nearest, _ = surface.nearest(middles)
-    at_most = np.full(len(middles), np.inf)
-    serves = float((away + own.errors + other.errors[nearest]).max())
-    faces, count = np.unique(other.face[nearest], return_counts=True)
+    (far, at_corner, _), (away, at_middle, _) = surface.nearest(own.points), surface.nearest(middles)
+    triangles = own.triangles
+    turns = np.einsum("mcj,mj->mc", surface.normals[at_corner[triangles]], surface.normals[at_middle])
+    reached = np.maximum((far + other.errors[at_corner])[triangles].max(axis=1), away + other.errors[at_middle])
+    at_most = np.where(turns.min(axis=1) > _ONE_SHEET, reached + own.errors, np.inf)
+    serves = float((away + other.errors[at_middle] + own.errors).max())
+    faces, count = np.unique(other.face[at_middle], return_counts=True)
     for face in faces[np.argsort(-count, kind="stable")]:
         of_face = other.face == face
         ends = other.points[other.triangles[of_face]].reshape(-1, 3)
         gaps = np.maximum(ends.min(axis=0) - middles, middles - ends.max(axis=0)).max(axis=1)
         rows = np.flatnonzero((at_most > serves) & (gaps <= serves))
-        corners, corner_of = np.unique(own.triangles[rows], return_inverse=True)
-        far = Surface(other.points, other.triangles[of_face]).distance(own.points[corners])
-        bound = far[corner_of.reshape(-1, 3)].max(axis=1) + own.errors[rows] + other.errors[of_face].max()
+        corners, corner_of = np.unique(triangles[rows], return_inverse=True)
+        single = Surface(other.points, other.triangles[of_face]).distance(own.points[corners])
+        bound = single[corner_of.reshape(-1, 3)].max(axis=1) + own.errors[rows] + other.errors[of_face].max()
         at_most[rows] = np.minimum(at_most[rows], bound)
-    return surface.distance(own.points), away, max(serves, float(at_most.max()))
+    return far, away, max(serves, float(at_most.max()))
