@@ -218,6 +218,28 @@ def test_between_the_corners_of_its_triangles_a_border_may_be_deepest(share):
         assert -0.007 <= distance.lower <= -0.006 <= distance.upper <= -0.00599
 
 
+@pytest.mark.parametrize("share", [0.5, 0.04, 0.004])
+def test_a_wedge_between_walls_is_deepest_where_no_triangle_has_its_middle(share):
+    """The overlap of two blocks with the same walls, one with a sloping underside: 0.01 mm by one wall."""
+    below = moved(block((-50, -50, -50), (50, 50, 0)), shift(0.0, 0.0, 4.998) @ turn((0, 1, 0), np.arctan(0.0004)))
+    a, b = models_of(block((0, 0, 0), (20, 20, 5)), cut(block((0, 0, 0), (20, 20, 15)), below))
+    distance = exact_overlap(a, b, np.eye(4), share)
+    assert -0.0101 <= distance.lower <= -0.01 / 1.0004
+
+
+def test_the_border_of_a_common_part_may_go_over_into_a_fillet():
+    """A shaft in a bore with rounded ends, off its axis: the triangles along it end over the fillets."""
+    bushing = cut(rod(8.0, 0.0, 6.0), rod(4.0, -1.0, 7.0))
+    rounding = occ.BRepFilletAPI_MakeFillet(bushing)
+    for edge in explore(bushing, "EDGE"):
+        curve = occ.BRepAdaptor_Curve(edge)
+        if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle and curve.Circle().Radius() < 5.0:
+            rounding.Add(0.3, edge)
+    a, b = models_of(rounding.Shape(), rod(4.0, -10.0, 16.0, 0.0094))
+    distance = exact_overlap(a, b, np.eye(4), 0.004)
+    assert -0.0098 <= distance.lower <= -0.0094 <= distance.upper <= -0.0093
+
+
 @pytest.mark.parametrize("lost", [1, 2, 3])
 def test_what_a_mesh_leaves_out_of_a_face_is_not_overlooked(lost, monkeypatch):
     """As Open CASCADE does of slender plane faces: with finer edges it may not; if it always does nothing is known."""
