@@ -46,6 +46,24 @@ def test_agrees_with_branch_and_bound_from_the_definition():
     assert narrow > 120
 
 
+@pytest.mark.parametrize("scale", [2.0**-9, 2.0**9])
+def test_no_length_is_absolute(scale):
+    """All sizes times a power of two: all answers are the same times that."""
+    rng = np.random.default_rng(8)
+    for _ in range(300):
+        groove, wire, T = random_scene(rng)
+        scaled = T.copy()
+        scaled[:3, 3] *= scale
+        other = SweptArc(scale * groove.radius, groove.half_angle, scale * groove.length)
+        for kind in (Cylinder, Capsule):
+            own, large = kind(wire.radius, wire.length), kind(scale * wire.radius, scale * wire.length)
+            one, many = signed_distance(groove, own, T), signed_distance(other, large, scaled)
+            assert (many.distance, many.feature) == (pytest.approx(scale * one.distance, rel=1e-12), one.feature)
+            few, rows = groove_pieces(groove, own, T), groove_pieces(other, large, scaled)
+            assert rows.distance == pytest.approx(scale * few.distance, rel=1e-12)
+            assert rows.gradient[:, :3] == pytest.approx(few.gradient[:, :3], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("groove", "wire", "turn", "place"),
     [
