@@ -10,7 +10,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
-from clamp3d.files.open_cascade import explore, from_bytes, matrix, occ, require_open_cascade
+from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points
 
@@ -70,7 +70,9 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
 
     Raises Clamp3dError if a face gets no triangles.
     """
-    solid, form = from_bytes(brep), surfaces(brep)
+    # A copy: of a solid with triangles Open CASCADE measures distances by their boxes, and leaves out what of a round
+    # flat face is beyond them.
+    solid, form = parse(brep), surfaces(brep)
     faces = [*explore(solid, "FACE")]
     for finer in _FINER:
         occ.BRepTools.Clean_s(solid)

@@ -192,6 +192,20 @@ def test_where_open_cascade_misses_a_common_part_or_some_of_it_nothing_is_known(
     assert exact_overlap(ball, cone, np.eye(4), 0.04, attested=0.004).lower <= -0.005
 
 
+@pytest.mark.parametrize("splines", [False, True])
+def test_what_is_measured_does_not_depend_on_meshes_that_were_made_before(splines):
+    """A cube's corner 0.009 mm above the end of a rod, beyond the polygon that its triangles make of the end."""
+    cube = moved(block((0, 0, 0), (8, 8, 8)), shift(19.995, 0.0, 0.009) @ turn((1, -1, 0), np.arccos(3.0**-0.5)))
+    for angle in (0.198, 0.287, 0.376, 1.0):
+        end = moved(rod(20.0, -10.0, 0.0), turn((0, 0, 1), angle))
+        if splines:
+            end = occ.BRepBuilderAPI_NurbsConvert(end, True).Shape()
+        solids = [BrepSolid.of(first_solid(solid), "solid") for solid in (end, cube)]
+        (row,) = check(Scene().add("rod", solids[0]).add("cube", solids[1])).pairs
+        assert row.verdict.value == "contact"
+        assert row.distance.lower <= 0.009 <= row.distance.upper <= 0.00901
+
+
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("family", ["balls", "ball_on_plate", "rods_crossed"])
 def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family, order):
