@@ -6,6 +6,7 @@ Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,14 +18,23 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.pairs import Border, CommonPart
+from clamp3d.files.pairs import Border, CommonPart, halves
+from clamp3d.files.tessellation import edge_middles
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
-_ONE_SHEET = 0.9
-"""Least cosine of the angle of triangles that count as one smooth sheet: a fillet and the face that it ends in."""
+_SERVES = 1.005
+"""Ratio of a bound of an interference to the depth of a point from which on it is not sharpened."""
+_BETWEEN = (1.0 / 3.0, 1.25)
+"""Factors on what a distance is above the corners' mean, for what it is more where nobody looks: above a smooth bend,
+which is next to quadratic, and above anything else, such as the tip of a cone, wherever it stands.
+"""
+_SMOOTH = 0.9
+"""Least cosine of the angle of the triangles that are nearest to one piece above a smooth sheet."""
+_CUTS = 100.0
+"""Triangles that those of a common part's border are cut into beyond their number at most, times the chords' share."""
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
 _NARROW, _HIDING = 9e-3, 0.01
@@ -110,14 +120,15 @@ def exact_overlap(
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    corners, middles, at_most = _deepest_places(shared)
+    corners, middles, at_most = _deepest_places(shared, round(_CUTS / share))
     points = np.concatenate([corners, middles])
     depths = depths_in(a, b, T, points)
     # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
     most = at_most + max(0.0, -float(depths[:, : len(corners)].min()))
-    if most + TOLERANCE < attested:  # some of it is missing
-        return unknown
-    return replace(attested_overlap(points, depths), lower=-most - TOLERANCE)
+    reached = attested_overlap(points, depths)
+    if most + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
+        return replace(reached, method=unknown.method)
+    return replace(reached, lower=-most - TOLERANCE)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:
@@ -138,55 +149,95 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     return Distance(-_NARROW, method=METHOD)
 
 
-def _deepest_places(shared: CommonPart) -> tuple[Array, Array, float]:
+def _deepest_places(shared: CommonPart, cuts: int) -> tuple[Array, Array, float]:
     """Corners (n, 3) and middles (k, 3) of triangles of a common part's border, and how deep (mm) any point is at most.
 
-    They are those that look deepest, and some of all other corners. Middles need not lie on the border.
-    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that than from
-    any one of its faces.
+    They are those that look deepest, and some of all other corners. Middles need not lie on the border. Up to ``cuts``
+    triangles are added to sharpen the bound.
+    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     """
-    on_a, on_b = shared.borders
-    (corners_a, middles_a, most_a), (corners_b, middles_b, most_b) = _depths_on(on_a, on_b), _depths_on(on_b, on_a)
-    corners = np.concatenate([on_a.points, on_b.points])
-    middles = np.concatenate([_middles(on_a), _middles(on_b)])
-    order = np.argsort(-np.concatenate([corners_a, corners_b]), kind="stable")
+    corners, middles, away, most = [], [], [], 0.0
+    for own, other in (shared.borders, shared.borders[::-1]):
+        corners.append(own.points)
+        middles.append(own.points[own.triangles].mean(axis=1))
+        points = np.concatenate([corners[-1], middles[-1]])
+        is_empty = not (len(own.triangles) and len(other.triangles))
+        far = np.full(len(points), np.inf) if is_empty else Surface(other.points, other.triangles).distance(points)
+        away.append(np.split(far, [len(own.points)]))
+        most = max(most, np.inf if is_empty else _at_most(own, other, float(far.max()), cuts))
+    (order, deepest) = (np.argsort(-np.concatenate(side), kind="stable") for side in zip(*away, strict=True))
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    deepest = np.argsort(-np.concatenate([middles_a, middles_b]), kind="stable")[:_PROBED]
-    return corners[tried], middles[deepest], max(most_a, most_b)
+    return np.concatenate(corners)[tried], np.concatenate(middles)[deepest[:_PROBED]], most
 
 
-def _middles(border: Border) -> Array:
-    """The middles (m, 3) of its triangles."""
-    return np.asarray(border.points[border.triangles].mean(axis=1))
+class _Sheet(NamedTuple):
+    """Some of a border: its ``surface``, how far (m,) mm that is off, and its box (2, 3)."""
+
+    surface: Surface
+    errors: Array
+    box: Array
+
+    @classmethod
+    def of(cls, border: Border, rows: Any) -> _Sheet:
+        """The triangles ``rows`` of a border."""
+        ends = border.points[border.triangles[rows]].reshape(-1, 3)
+        box = np.array([ends.min(axis=0), ends.max(axis=0)])
+        return cls(Surface(border.points, border.triangles[rows]), border.errors[rows], box)
 
 
-def _depths_on(own: Border, other: Border) -> tuple[Array, Array, float]:
-    """How far corners (n,) and middles (m,) of a border's triangles are from another, and any point at most, mm.
+def _at_most(own: Border, other: Border, reached: float, cuts: int) -> float:
+    """How far (mm) any point of a border is from another one at most, ``reached`` mm being what some corner is.
 
-    Over a smooth sheet a corner of a triangle is farthest, or its middle. Where the nearest triangles are not of one
-    sheet, the corners may be less far than what is between them: those of a slab are at its walls. There the bound is
-    the least that any face by itself gives; once it is all but as little as the farthest middle it serves.
+    Triangles are cut across their longest sides until their bounds are sharp, or ``cuts`` are made.
     """
-    middles = _middles(own)
-    if not (len(own.triangles) and len(other.triangles)):
-        unknown = np.inf if len(own.triangles) else 0.0
-        return np.full(len(own.points), unknown), np.full(len(middles), unknown), unknown
-    surface = Surface(other.points, other.triangles)
-    (far, at_corner, _), (away, at_middle, _) = surface.nearest(own.points), surface.nearest(middles)
-    triangles = own.triangles
-    turns = np.einsum("mcj,mj->mc", surface.normals[at_corner[triangles]], surface.normals[at_middle])
-    reached = np.maximum((far + other.errors[at_corner])[triangles].max(axis=1), away + other.errors[at_middle])
-    at_most = np.where(turns.min(axis=1) > _ONE_SHEET, reached + own.errors, np.inf)
-    serves = float((away + other.errors[at_middle] + own.errors).max())
-    faces, count = np.unique(other.face[at_middle], return_counts=True)
-    for face in faces[np.argsort(-count, kind="stable")]:
-        of_face = other.face == face
-        ends = other.points[other.triangles[of_face]].reshape(-1, 3)
-        gaps = np.maximum(ends.min(axis=0) - middles, middles - ends.max(axis=0)).max(axis=1)
-        rows = np.flatnonzero((at_most > serves) & (gaps <= serves))
-        corners, corner_of = np.unique(triangles[rows], return_inverse=True)
-        single = Surface(other.points, other.triangles[of_face]).distance(own.points[corners])
-        bound = single[corner_of.reshape(-1, 3)].max(axis=1) + own.errors[rows] + other.errors[of_face].max()
-        at_most[rows] = np.minimum(at_most[rows], bound)
-    return far, away, max(serves, float(at_most.max()))
+    faces, number = np.unique(other.face, return_counts=True)
+    largest_first = faces[np.argsort(-number, kind="stable")]
+    sheets = [*(_Sheet.of(other, other.face == face) for face in largest_first), _Sheet.of(other, slice(None))]
+    pieces, errors, sharp, count = own.points[own.triangles], own.errors, 0.0, 0
+    while True:
+        at_most, off = _bounds(pieces, sheets, _SERVES * reached - errors)
+        at_most += errors
+        open_ = at_most > _SERVES * reached + errors + off
+        count += int(open_.sum())
+        if not open_.any() or count > cuts:
+            return max(sharp, reached, float(at_most.max()))
+        sharp = max(sharp, float(at_most[~open_].max(initial=0.0)))
+        sides = np.linalg.norm(np.roll(pieces[open_], -1, axis=1) - pieces[open_], axis=2)
+        pieces = halves(pieces[open_], edge_middles(pieces[open_]), sides.argmax(axis=1))
+        errors = np.tile(errors[open_], 2)
+
+
+def _bounds(pieces: Array, sheets: list[_Sheet], serves: Array) -> tuple[Array, Array]:
+    """How far (m,) mm any point of triangles (m, 3, 3) is from a border at most, and how far (m,) that is off.
+
+    ``sheets`` are its faces, and last all of it. The least of three bounds: no point is farther than the middle by more
+    than it is away from that; and where this is more than ``serves`` (m,), what `_over_sheet` says of single faces and
+    of all: the corners of a slab are at its walls, so of both together it knows nothing.
+    """
+    middles = pieces.mean(axis=1)
+    away, nearest, _ = sheets[-1].surface.nearest(middles)
+    off = sheets[-1].errors[nearest]
+    at_most = away + np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1) + off
+    for sheet in sheets:
+        gaps = np.maximum(sheet.box[0] - middles, middles - sheet.box[1]).max(axis=1)
+        rows = np.flatnonzero((at_most > serves) & (gaps <= 2.0 * (serves + off)))
+        at_most[rows] = np.minimum(at_most[rows], _over_sheet(pieces[rows], sheet))
+    return at_most, off
+
+
+def _over_sheet(pieces: Array, sheet: _Sheet) -> Array:
+    """How far (m,) mm any point of triangles (m, 3, 3) is at most from a sheet.
+
+    It is looked at in the corners, the middles of the sides and the middle. Above a plane the distance there is the
+    mean of the corners'. By how much it is more above a bend, the ridge of a roof or the tip of a cone, so much more it
+    can be between these places at most, times `_BETWEEN`.
+    """
+    places = np.concatenate([pieces, edge_middles(pieces), pieces.mean(axis=1, keepdims=True)], axis=1)
+    away, nearest, _ = sheet.surface.nearest(places.reshape(-1, 3))
+    away = (away + sheet.errors[nearest]).reshape(-1, 7, 1)
+    means = np.concatenate([edge_middles(away[:, :3]), away[:, :3].mean(axis=1, keepdims=True)], axis=1)
+    above = (away[:, 3:] - means).max(axis=(1, 2), initial=0.0)
+    normals = sheet.surface.normals[nearest].reshape(-1, 7, 3)
+    is_smooth = (normals @ normals[:, 6, :, None]).min(axis=(1, 2), initial=1.0) > _SMOOTH
+    return np.asarray(away.max(axis=(1, 2), initial=0.0) + np.where(is_smooth, *_BETWEEN) * above)

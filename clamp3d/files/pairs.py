@@ -289,12 +289,12 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
         farthest = max(farthest, float(off[~wide].max(initial=0.0)))
         count += int(wide.sum())
         edge = off[wide].argmax(axis=1)
-        corners = _halves(corners[wide], middles[wide], edge)
-        ends = _halves(ends[wide], true[wide], edge)
+        corners = halves(corners[wide], middles[wide], edge)
+        ends = halves(ends[wide], true[wide], edge)
     return np.concatenate(finished), farthest
 
 
-def _halves(corners: Array, middles: Array, edge: IntArray) -> Array:
+def halves(corners: Array, middles: Array, edge: IntArray) -> Array:
     """Triangles (2 m, 3, k): each of (m, 3, k) cut in two from the middle of an edge, whose number (m,) is given."""
     rows = np.arange(len(corners))
     a, b, c, middle = corners[rows, edge], corners[rows, (edge + 1) % 3], corners[rows, edge - 1], middles[rows, edge]
