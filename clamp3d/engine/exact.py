@@ -33,8 +33,10 @@ which is next to quadratic, and above anything else, such as the tip of a cone, 
 """
 _SMOOTH = 0.9
 """Least cosine of the angle of the triangles that are nearest to one piece above a smooth sheet."""
-_CUTS = 100.0
-"""Triangles that those of a common part's border are cut into beyond their number at most, times the chords' share."""
+_CUTS, _MOST_CUTS = 450.0, 30_000
+"""Triangles that those of a common part's border are cut into beyond their number, times the chords' share, and at
+most: two seconds.
+"""
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
 _NARROW, _HIDING = 9e-3, 0.01
@@ -120,7 +122,7 @@ def exact_overlap(
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    corners, middles, at_most = _deepest_places(shared, round(_CUTS / share))
+    corners, middles, at_most = _deepest_places(shared, min(round(_CUTS / share), _MOST_CUTS))
     points = np.concatenate([corners, middles])
     depths = depths_in(a, b, T, points)
     # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
@@ -194,25 +196,26 @@ def _at_most(own: Border, other: Border, reached: float, cuts: int) -> float:
     faces, number = np.unique(other.face, return_counts=True)
     largest_first = faces[np.argsort(-number, kind="stable")]
     sheets = [*(_Sheet.of(other, other.face == face) for face in largest_first), _Sheet.of(other, slice(None))]
-    pieces, errors, sharp, count = own.points[own.triangles], own.errors, 0.0, 0
+    pieces, errors = own.points[own.triangles], own.errors
+    at_most, seen, off = _bounds(pieces, errors, sheets, _SERVES * reached)
+    least, count = _SERVES * reached + float(off[seen.argmax()]), 0  # no bound of all is less
     while True:
-        at_most, off = _bounds(pieces, sheets, _SERVES * reached - errors)
-        at_most += errors
-        open_ = at_most > _SERVES * reached + errors + off
-        count += int(open_.sum())
-        if not open_.any() or count > cuts:
-            return max(sharp, reached, float(at_most.max()))
-        sharp = max(sharp, float(at_most[~open_].max(initial=0.0)))
-        sides = np.linalg.norm(np.roll(pieces[open_], -1, axis=1) - pieces[open_], axis=2)
-        pieces = halves(pieces[open_], edge_middles(pieces[open_]), sides.argmax(axis=1))
-        errors = np.tile(errors[open_], 2)
+        worst = at_most > np.maximum(least, seen + off + (_SERVES - 1.0) * reached)
+        worst &= at_most >= 0.5 * (least + at_most[worst].max(initial=0.0))
+        count += int(worst.sum())
+        if not worst.any() or count > cuts:
+            return max(reached, float(at_most.max()))
+        sides = np.linalg.norm(np.roll(pieces[worst], -1, axis=1) - pieces[worst], axis=2)
+        cut, twice = halves(pieces[worst], edge_middles(pieces[worst]), sides.argmax(axis=1)), np.tile(errors[worst], 2)
+        old, new = (pieces, errors, at_most, seen, off), (cut, twice, *_bounds(cut, twice, sheets, _SERVES * reached))
+        pieces, errors, at_most, seen, off = (np.concatenate([x[~worst], y]) for x, y in zip(old, new, strict=True))
 
 
-def _bounds(pieces: Array, sheets: list[_Sheet], serves: Array) -> tuple[Array, Array]:
-    """How far (m,) mm any point of triangles (m, 3, 3) is from a border at most, and how far (m,) that is off.
+def _bounds(pieces: Array, errors: Array, sheets: list[_Sheet], serves: float) -> tuple[Array, Array, Array]:
+    """How far (m,) mm any point of triangles (m, 3, 3) is from a border at most, its middle (m,), and its error (m,).
 
     ``sheets`` are its faces, and last all of it. The least of three bounds: no point is farther than the middle by more
-    than it is away from that; and where this is more than ``serves`` (m,), what `_over_sheet` says of single faces and
+    than it is away from that; and where this is more than ``serves`` mm, what `_over_sheet` says of single faces and
     of all: the corners of a slab are at its walls, so of both together it knows nothing.
     """
     middles = pieces.mean(axis=1)
@@ -221,9 +224,9 @@ def _bounds(pieces: Array, sheets: list[_Sheet], serves: Array) -> tuple[Array, 
     at_most = away + np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1) + off
     for sheet in sheets:
         gaps = np.maximum(sheet.box[0] - middles, middles - sheet.box[1]).max(axis=1)
-        rows = np.flatnonzero((at_most > serves) & (gaps <= 2.0 * (serves + off)))
+        rows = np.flatnonzero((at_most + errors > serves) & (gaps <= 2.0 * (serves + off)))
         at_most[rows] = np.minimum(at_most[rows], _over_sheet(pieces[rows], sheet))
-    return at_most, off
+    return at_most + errors, away, off + errors
 
 
 def _over_sheet(pieces: Array, sheet: _Sheet) -> Array:
