@@ -6,11 +6,11 @@ Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.border import distances_across
 from clamp3d.engine.model import Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
@@ -18,24 +18,15 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.pairs import Border, CommonPart, halves
-from clamp3d.files.tessellation import edge_middles
+from clamp3d.files.pairs import CommonPart
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
-_SERVES = 1.005
-"""Ratio of a bound of an interference to the depth of a point from which on it is not sharpened."""
-_BETWEEN = (1.0 / 3.0, 1.25)
-"""Factors on what a distance is above the corners' mean, for what it is more where nobody looks: above a smooth bend,
-which is next to quadratic, and above anything else, such as the tip of a cone, wherever it stands.
-"""
-_SMOOTH = 0.9
-"""Least cosine of the angle of the triangles that are nearest to one piece above a smooth sheet."""
 _CUTS, _MOST_CUTS = 450.0, 30_000
-"""Triangles that those of a common part's border are cut into beyond their number, times the chords' share, and at
-most: two seconds.
+"""Triangles that are added to a common part's border at most to bound its depth: as many over the chords' share, so
+that coarse samples are not cut for long, and never more than the second, which take two seconds.
 """
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
@@ -158,89 +149,12 @@ def _deepest_places(shared: CommonPart, cuts: int) -> tuple[Array, Array, float]
     triangles are added to sharpen the bound.
     Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     """
-    corners, middles, away, most = [], [], [], 0.0
-    for own, other in (shared.borders, shared.borders[::-1]):
-        corners.append(own.points)
-        middles.append(own.points[own.triangles].mean(axis=1))
-        points = np.concatenate([corners[-1], middles[-1]])
-        is_empty = not (len(own.triangles) and len(other.triangles))
-        far = np.full(len(points), np.inf) if is_empty else Surface(other.points, other.triangles).distance(points)
-        away.append(np.split(far, [len(own.points)]))
-        most = max(most, np.inf if is_empty else _at_most(own, other, float(far.max()), cuts))
-    (order, deepest) = (np.argsort(-np.concatenate(side), kind="stable") for side in zip(*away, strict=True))
+    on_a, on_b = shared.borders
+    sides = distances_across(on_a, on_b, cuts), distances_across(on_b, on_a, cuts)
+    corners = np.concatenate([on_a.points, on_b.points])
+    middles = np.concatenate([border.points[border.triangles].mean(axis=1) for border in shared.borders])
+    order = np.argsort(-np.concatenate([side.corners for side in sides]), kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
-    return np.concatenate(corners)[tried], np.concatenate(middles)[deepest[:_PROBED]], most
-
-
-class _Sheet(NamedTuple):
-    """Some of a border: its ``surface``, how far (m,) mm that is off, and its box (2, 3)."""
-
-    surface: Surface
-    errors: Array
-    box: Array
-
-    @classmethod
-    def of(cls, border: Border, rows: Any) -> _Sheet:
-        """The triangles ``rows`` of a border."""
-        ends = border.points[border.triangles[rows]].reshape(-1, 3)
-        box = np.array([ends.min(axis=0), ends.max(axis=0)])
-        return cls(Surface(border.points, border.triangles[rows]), border.errors[rows], box)
-
-
-def _at_most(own: Border, other: Border, reached: float, cuts: int) -> float:
-    """How far (mm) any point of a border is from another one at most, ``reached`` mm being what some corner is.
-
-    Triangles are cut across their longest sides until their bounds are sharp, or ``cuts`` are made.
-    """
-    faces, number = np.unique(other.face, return_counts=True)
-    largest_first = faces[np.argsort(-number, kind="stable")]
-    sheets = [*(_Sheet.of(other, other.face == face) for face in largest_first), _Sheet.of(other, slice(None))]
-    pieces, errors = own.points[own.triangles], own.errors
-    at_most, seen, off = _bounds(pieces, errors, sheets, _SERVES * reached)
-    least, count = _SERVES * reached + float(off[seen.argmax()]), 0  # no bound of all is less
-    while True:
-        worst = at_most > np.maximum(least, seen + off + (_SERVES - 1.0) * reached)
-        worst &= at_most >= 0.5 * (least + at_most[worst].max(initial=0.0))
-        count += int(worst.sum())
-        if not worst.any() or count > cuts:
-            return max(reached, float(at_most.max()))
-        sides = np.linalg.norm(np.roll(pieces[worst], -1, axis=1) - pieces[worst], axis=2)
-        cut, twice = halves(pieces[worst], edge_middles(pieces[worst]), sides.argmax(axis=1)), np.tile(errors[worst], 2)
-        old, new = (pieces, errors, at_most, seen, off), (cut, twice, *_bounds(cut, twice, sheets, _SERVES * reached))
-        pieces, errors, at_most, seen, off = (np.concatenate([x[~worst], y]) for x, y in zip(old, new, strict=True))
-
-
-def _bounds(pieces: Array, errors: Array, sheets: list[_Sheet], serves: float) -> tuple[Array, Array, Array]:
-    """How far (m,) mm any point of triangles (m, 3, 3) is from a border at most, its middle (m,), and its error (m,).
-
-    ``sheets`` are its faces, and last all of it. The least of three bounds: no point is farther than the middle by more
-    than it is away from that; and where this is more than ``serves`` mm, what `_over_sheet` says of single faces and
-    of all: the corners of a slab are at its walls, so of both together it knows nothing.
-    """
-    middles = pieces.mean(axis=1)
-    away, nearest, _ = sheets[-1].surface.nearest(middles)
-    off = sheets[-1].errors[nearest]
-    at_most = away + np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1) + off
-    for sheet in sheets:
-        gaps = np.maximum(sheet.box[0] - middles, middles - sheet.box[1]).max(axis=1)
-        rows = np.flatnonzero((at_most + errors > serves) & (gaps <= 2.0 * (serves + off)))
-        at_most[rows] = np.minimum(at_most[rows], _over_sheet(pieces[rows], sheet))
-    return at_most + errors, away, off + errors
-
-
-def _over_sheet(pieces: Array, sheet: _Sheet) -> Array:
-    """How far (m,) mm any point of triangles (m, 3, 3) is at most from a sheet.
-
-    It is looked at in the corners, the middles of the sides and the middle. Above a plane the distance there is the
-    mean of the corners'. By how much it is more above a bend, the ridge of a roof or the tip of a cone, so much more it
-    can be between these places at most, times `_BETWEEN`.
-    """
-    places = np.concatenate([pieces, edge_middles(pieces), pieces.mean(axis=1, keepdims=True)], axis=1)
-    away, nearest, _ = sheet.surface.nearest(places.reshape(-1, 3))
-    away = (away + sheet.errors[nearest]).reshape(-1, 7, 1)
-    means = np.concatenate([edge_middles(away[:, :3]), away[:, :3].mean(axis=1, keepdims=True)], axis=1)
-    above = (away[:, 3:] - means).max(axis=(1, 2), initial=0.0)
-    normals = sheet.surface.normals[nearest].reshape(-1, 7, 3)
-    is_smooth = (normals @ normals[:, 6, :, None]).min(axis=(1, 2), initial=1.0) > _SMOOTH
-    return np.asarray(away.max(axis=(1, 2), initial=0.0) + np.where(is_smooth, *_BETWEEN) * above)
+    deepest = np.argsort(-np.concatenate([side.middles for side in sides]), kind="stable")[:_PROBED]
+    return corners[tried], middles[deepest], max(side.at_most for side in sides)

@@ -14,7 +14,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.shells import volume
-from clamp3d.geometry.triangles import closest_points, normals_and_areas
+from clamp3d.geometry.triangles import closest_points, normals_and_areas, quarters
 
 _INNER = 40
 """Triangles of an overlap under which a point is tried."""
@@ -211,7 +211,7 @@ def _cut(surface: Surface, T: Array, pieces: Array) -> Array:
     border = reach.argmax(axis=1)
     rows = np.arange(len(pieces))
     over = reach[rows, border] > _HAIR * surface.scale
-    return np.concatenate([_split(pieces[over], height[rows, border][over]), quartered(pieces[~over])])
+    return np.concatenate([_split(pieces[over], height[rows, border][over]), quarters(pieces[~over])])
 
 
 def _split(pieces: Array, height: Array) -> Array:
@@ -224,11 +224,3 @@ def _split(pieces: Array, height: Array) -> Array:
     ab = a + (h / (h - i))[:, None] * (b - a)
     ac = a + (h / (h - j))[:, None] * (c - a)
     return np.concatenate([np.stack(corners, axis=1) for corners in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
-
-
-def quartered(pieces: Array) -> Array:
-    """Triangles (4 m, 3, 3): each of (m, 3, 3) cut at the middles of its sides."""
-    a, b, c = pieces[:, 0], pieces[:, 1], pieces[:, 2]
-    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-    cut = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.concatenate([np.stack(corners, axis=1) for corners in cut])

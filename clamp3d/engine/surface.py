@@ -64,6 +64,10 @@ class Surface:
         """Lower and upper corner (2, 3), mm."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
+    def box_gap(self, points: Array) -> Array:
+        """How far (k,) mm points (k, 3) are beyond the box, along the axis where that is most: no nearer they are."""
+        return np.asarray(np.maximum(self.box[0] - points, points - self.box[1]).max(axis=1))
+
     @cached_property
     def bvh(self) -> Any:
         """FCL's tree of oriented boxes."""

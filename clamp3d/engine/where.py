@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from clamp3d.engine.model import QUICK_TRIANGLES, MeshModel, Model, box_corners
-from clamp3d.engine.overlap import Common, common, deepest, quartered
+from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
-from clamp3d.geometry.triangles import normals_and_areas
+from clamp3d.geometry.triangles import normals_and_areas, quarters
 
 _SHARE = 0.005
 """Relative width of the interval of the volume at which it is not refined further."""
@@ -197,15 +197,15 @@ def _area_near(surface: Surface, other: Surface, T: Array, reach: float) -> floa
     while True:
         middles = pieces.mean(axis=1)
         size = np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1)
-        gaps = np.maximum(other.box[0] - middles, middles - other.box[1]).max(axis=1)
-        pieces, middles, size = (x[gaps <= reach + size] for x in (pieces, middles, size))
+        may_be_near = other.box_gap(middles) <= reach + size
+        pieces, middles, size = (x[may_be_near] for x in (pieces, middles, size))
         is_near = other.distance(middles) <= reach + size
         beyond = pieces[~is_near]
         area_inside += float(normals_and_areas(beyond[other.contains(middles[~is_near])])[1].sum())
         pieces, size = pieces[is_near], size[is_near]
         if 4 * len(pieces) > _PIECES or size.max(initial=0.0) <= reach:
             return area_inside + float(normals_and_areas(pieces)[1].sum())
-        pieces = quartered(pieces)
+        pieces = quarters(pieces)
 
 
 def _box(points: Array, slack: float = 0.0) -> Array:

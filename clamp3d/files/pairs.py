@@ -25,10 +25,10 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, SAMPLED, covers, edge_middles, triangles_of
+from clamp3d.files.tessellation import ANGLE, SAMPLED, covers, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
-from clamp3d.geometry.triangles import normals_and_areas
+from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
 
 _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
@@ -292,13 +292,6 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
         corners = halves(corners[wide], middles[wide], edge)
         ends = halves(ends[wide], true[wide], edge)
     return np.concatenate(finished), farthest
-
-
-def halves(corners: Array, middles: Array, edge: IntArray) -> Array:
-    """Triangles (2 m, 3, k): each of (m, 3, k) cut in two from the middle of an edge, whose number (m,) is given."""
-    rows = np.arange(len(corners))
-    a, b, c, middle = corners[rows, edge], corners[rows, (edge + 1) % 3], corners[rows, edge - 1], middles[rows, edge]
-    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
 def depths(brep: bytes, points: Array) -> Array:

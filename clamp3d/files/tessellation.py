@@ -12,7 +12,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
-from clamp3d.geometry.triangles import closest_points
+from clamp3d.geometry.triangles import closest_points, edge_middles
 
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
@@ -182,11 +182,6 @@ def _numbers(count: int) -> Any:
     OCP = require_open_cascade()
     made = getattr(OCP.collections, "Array1_double", None) if hasattr(OCP, "collections") else None
     return (made or occ.TColStd_Array1OfReal)(1, count)
-
-
-def edge_middles(corners: Array) -> Array:
-    """The middles (m, 3, k) of the edges of triangles (m, 3, k), each of that which begins at a corner."""
-    return np.asarray(0.5 * (corners + np.roll(corners, -1, axis=1)))
 
 
 def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:

@@ -22,7 +22,7 @@ from tests.clamp.orders import manifold
 from tests.clamp.outlines import outline
 from tests.refusals import refusals_of
 
-COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "10"))
+COUNT = int(os.environ.get("CLAMP3D_RANDOM_STARTS", "16"))
 STIFF = 4.0
 """Springs of so many bolt forces a mm hold contacts: parts sink in by a few tenths of a mm."""
 STEP = 0.2 / STIFF
@@ -174,7 +174,7 @@ def test_the_map_is_of_closings_from_its_places(placed):
     found = placed.capture
     assert found.outcome.shape == (len(found.height), len(found.sideways)) == (2, 8)
     section = Section(load_clamp(), Cas())
-    for (i, j), code in [*np.ndenumerate(found.outcome)][::3]:
+    for (i, j), code in np.ndenumerate(found.outcome):
         start = open_start(section)
         start[2:4] += found.sideways[j], -found.height[i]
         assert close_from(section, start) == code

@@ -46,7 +46,7 @@ def test_any_open_start_ends_in_the_same_state(clamp):
         assert solve_final_state(section, start).q == pytest.approx(known, abs=1e-9)
 
 
-@pytest.mark.parametrize("k", [0, 10])
+@pytest.mark.parametrize("k", [0, 6, 10])
 def test_positions_that_are_tried_are_those_that_envelopes_in_closed_form_leave_free(k):
     """Down from the open clamp, each time at the free tilt next to the last one; at last at the one with most room."""
     clamp, step, turn, told = whole_clamp(np.random.default_rng([41, k]), major=0.0), 2.0, math.radians(1.0), []
@@ -200,7 +200,7 @@ def test_curvatures_agree_with_differences_of_gradients(clamp):
 
 def test_pairs_of_conductors_end_in_a_stated_result():
     """The thinnest, the thickest and a spread of others: what the status says is what the contacts are."""
-    names = list(catalogue())[::21]
+    names = list(catalogue())[::17]
     stated = set()
     for k, (line, jumper) in enumerate(itertools.product(names, names)):
         run = assemble(load_clamp(line=line, jumper=jumper), Cas())
