@@ -241,6 +241,13 @@ def test_a_wedge_between_walls_is_deepest_where_no_triangle_has_its_middle(share
     assert -0.0101 <= distance.lower <= -0.01 / 1.0004
 
 
+@pytest.mark.parametrize("share", [0.04, 0.015, 0.004])
+def test_a_sheet_across_a_rod_is_deepest_in_its_middle(share):
+    """As deep as the rod is thick to its axis, where no corner of the border need be."""
+    a, b = models_of(rod(3.0, -10.0, 10.0), block((-9, -9, 0), (9, 9, 1)))
+    assert -3.03 <= exact_overlap(a, b, np.eye(4), share).lower <= -3.0
+
+
 def test_the_border_of_a_common_part_may_go_over_into_a_fillet():
     """A shaft in a bore with rounded ends, off its axis: the triangles along it end over the fillets."""
     bushing = cut(rod(8.0, 0.0, 6.0), rod(4.0, -1.0, 7.0))
