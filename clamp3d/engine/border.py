@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 
 from clamp3d.engine.surface import Surface
 from clamp3d.files.pairs import Border
+from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.triangles import edge_middles, halves
 
-_SERVES = 1.005
+_SHARP = 1.005
 """Ratio of a bound to the greatest distance that was measured from which on it is not sharpened."""
 _BETWEEN = (1.0 / 3.0, 1.25)
 """Factors on what a distance is above the corners' mean, for what it is more where nobody looks: above a smooth bend,
@@ -21,29 +23,46 @@ which is next to quadratic, and above anything else, such as the tip of a cone, 
 _SMOOTH = 0.9
 """Least cosine of the angle of the triangles that are nearest to one piece above a smooth sheet."""
 
+End = Callable[[float, float], bool]
+"""Whether a bound (mm) is sharp enough, or none can be, since each is at least the second number (mm)."""
 
-class Distances(NamedTuple):
-    """How far (mm) one side of a border is from the other: its corners (n,), the middles (m,) of its triangles, and any
-    point ``at_most``.
+
+class Side(NamedTuple):
+    """How far (mm) one side of a border is from the other: its corners (n,) and middles (m,) of its triangles.
+
+    ``pieces`` are these triangles, ``other`` is the other side.
     """
 
     corners: Array
     middles: Array
-    at_most: float
+    pieces: _Pieces
+    other: _Sheets
 
+    @classmethod
+    def of(cls, own: Border, other: Border) -> Side:
+        """One side of a border; neither is empty."""
+        sheets = _Sheets.of(other)
+        pieces = _Pieces.of(own.points[own.triangles], own.errors, sheets)
+        return cls(sheets.whole.surface.distance(own.points), pieces.middles, pieces, sheets)
 
-def distances_across(own: Border, other: Border, cuts: int) -> Distances:
-    """How far one side of a border is from the other; all is infinite where one of them is empty.
+    def at_most(self, end: End, cuts: int) -> float:
+        """How far (mm) any point is from the other side at most, sharpened until the ``end``.
 
-    Up to ``cuts`` triangles are added to sharpen the bound.
-    """
-    if not (len(own.triangles) and len(other.triangles)):
-        return Distances(np.full(len(own.points), np.inf), np.full(len(own.triangles), np.inf), np.inf)
-    side = _Side.of(other)
-    corners = side.whole.surface.distance(own.points)
-    pieces = _Pieces.of(own.points[own.triangles], own.errors, side)
-    reached = max(float(corners.max()), float(pieces.middles.max()))
-    return Distances(corners, pieces.middles, _at_most(pieces, side, reached, cuts))
+        The farthest triangles are cut until their bounds are sharp, or ``cuts`` are added.
+        """
+        reached = float(max(self.corners.max(), self.middles.max()))
+        serves, pieces = _SHARP * reached, self.pieces
+        least = serves + float(pieces.off[self.middles.argmax()])  # it may be so much more at that middle
+        bound = float(pieces.at_most.max())
+        pieces = pieces if end(bound, least) else pieces.sharpened(self.other, serves)
+        while True:
+            bound = max(reached, float(pieces.at_most.max()))
+            worst = pieces.at_most > np.maximum(least, pieces.middles + pieces.off + serves - reached)
+            worst &= pieces.at_most >= 0.5 * (least + pieces.at_most[worst].max(initial=0.0))
+            cuts -= int(worst.sum())
+            if not worst.any() or cuts < 0 or end(bound, least):
+                return bound
+            pieces = pieces.halved(worst, self.other, serves)
 
 
 class _Sheet(NamedTuple):
@@ -59,18 +78,18 @@ class _Sheet(NamedTuple):
         return cls(Surface(border.points[used], triangles.reshape(-1, 3)), border.errors[rows])
 
 
-class _Side(NamedTuple):
-    """All of one side of a border, and each of its faces by itself, those with the most triangles first."""
+class _Sheets(NamedTuple):
+    """All of one side of a border, each of its faces by itself, and which of these (m,) each triangle is of."""
 
     whole: _Sheet
     faces: list[_Sheet]
+    face: IntArray
 
     @classmethod
-    def of(cls, border: Border) -> _Side:
+    def of(cls, border: Border) -> _Sheets:
         """The sheets of a border."""
-        faces, number = np.unique(border.face, return_counts=True)
-        order = np.argsort(-number, kind="stable")
-        return cls(_Sheet.of(border, slice(None)), [_Sheet.of(border, border.face == face) for face in faces[order]])
+        numbers, face = np.unique(border.face, return_inverse=True)
+        return cls(_Sheet.of(border, slice(None)), [_Sheet.of(border, border.face == k) for k in numbers], face)
 
 
 class _Pieces(NamedTuple):
@@ -85,54 +104,44 @@ class _Pieces(NamedTuple):
     at_most: Array
 
     @classmethod
-    def of(cls, triangles: Array, errors: Array, side: _Side) -> _Pieces:
+    def of(cls, triangles: Array, errors: Array, other: _Sheets) -> _Pieces:
         """Bounded by their middles: no point is farther than that by more than it is away from it."""
         middles = triangles.mean(axis=1)
-        away, nearest, _ = side.whole.surface.nearest(middles)
-        off = errors + side.whole.errors[nearest]
+        away, nearest, _ = other.whole.surface.nearest(middles)
+        off = errors + other.whole.errors[nearest]
         radius = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
         return cls(triangles, errors, away, off, away + radius + off)
 
-    def sharpened(self, side: _Side, serves: float) -> _Pieces:
+    def sharpened(self, other: _Sheets, serves: float) -> _Pieces:
         """With the least of these bounds and what `_over_sheet` says, while it is above ``serves`` mm.
 
-        Of single faces and of all: the corners of a slab are at its walls, so of both together nothing is known.
+        Of all and of single faces: the corners of a slab are at its walls, so of both together nothing is known.
         """
-        at_most, middles = self.at_most.copy(), self.triangles.mean(axis=1)
-        for sheet in (*side.faces, side.whole):
-            may_be_near = sheet.surface.box_gap(middles) <= 2.0 * (serves + self.off)
-            rows = np.flatnonzero((at_most > serves) & may_be_near)
-            at_most[rows] = np.minimum(at_most[rows], _over_sheet(self.triangles[rows], sheet) + self.errors[rows])
+        at_most = self.at_most.copy()
+
+        def bounded_over(sheet: _Sheet, rows: IntArray) -> IntArray:
+            bounds, nearest = _over_sheet(self.triangles[rows], sheet)
+            at_most[rows] = np.minimum(at_most[rows], bounds + self.errors[rows])
+            return nearest
+
+        rows = np.flatnonzero(at_most > serves)
+        near = other.face[bounded_over(other.whole, rows)]
+        for k, sheet in enumerate(other.faces):
+            is_over_some = (near == k).any(axis=1) & (near != k).any(axis=1)
+            bounded_over(sheet, rows[is_over_some & (at_most[rows] > serves)])
         return self._replace(at_most=at_most)
 
-    def halved(self, rows: NDArray[np.bool_], side: _Side, serves: float) -> _Pieces:
+    def halved(self, rows: NDArray[np.bool_], other: _Sheets, serves: float) -> _Pieces:
         """With some of them cut across their longest sides."""
         cut = self.triangles[rows]
         longest = np.linalg.norm(np.roll(cut, -1, axis=1) - cut, axis=2).argmax(axis=1)
-        new = _Pieces.of(halves(cut, edge_middles(cut), longest), np.tile(self.errors[rows], 2), side)
-        both = zip(self, new.sharpened(side, serves), strict=True)
-        return _Pieces(*(np.concatenate([own[~rows], other]) for own, other in both))
+        new = _Pieces.of(halves(cut, edge_middles(cut), longest), np.tile(self.errors[rows], 2), other)
+        both = zip(self, new.sharpened(other, serves), strict=True)
+        return _Pieces(*(np.concatenate([own[~rows], halved]) for own, halved in both))
 
 
-def _at_most(pieces: _Pieces, side: _Side, reached: float, cuts: int) -> float:
-    """How far (mm) any point of pieces is from a side at most, ``reached`` mm being what some corner or middle is.
-
-    The farthest are cut until their bounds are sharp, or ``cuts`` are made.
-    """
-    serves = _SERVES * reached
-    pieces = pieces.sharpened(side, serves)
-    least = serves + float(pieces.off[pieces.middles.argmax()])  # no bound of all is less
-    while True:
-        worst = pieces.at_most > np.maximum(least, pieces.middles + pieces.off + serves - reached)
-        worst &= pieces.at_most >= 0.5 * (least + pieces.at_most[worst].max(initial=0.0))
-        cuts -= int(worst.sum())
-        if not worst.any() or cuts < 0:
-            return max(reached, float(pieces.at_most.max()))
-        pieces = pieces.halved(worst, side, serves)
-
-
-def _over_sheet(pieces: Array, sheet: _Sheet) -> Array:
-    """How far (m,) mm any point of triangles (m, 3, 3) is at most from a sheet.
+def _over_sheet(pieces: Array, sheet: _Sheet) -> tuple[Array, IntArray]:
+    """How far (m,) mm any point of triangles (m, 3, 3) is at most from a sheet, and its triangles (m, 7) near them.
 
     It is looked at in the corners, the middles of the sides and the middle. Above a plane the distance there is the
     mean of the corners'. By how much it is more above a bend, the ridge of a roof or the tip of a cone, so much more it
@@ -145,4 +154,5 @@ def _over_sheet(pieces: Array, sheet: _Sheet) -> Array:
     above = (away[:, 3:] - means).max(axis=(1, 2), initial=0.0)
     normals = sheet.surface.normals[nearest].reshape(-1, 7, 3)
     is_smooth = (normals @ normals[:, 6, :, None]).min(axis=(1, 2), initial=1.0) > _SMOOTH
-    return np.asarray(away.max(axis=(1, 2), initial=0.0) + np.where(is_smooth, *_BETWEEN) * above)
+    bounds = away.max(axis=(1, 2), initial=0.0) + np.where(is_smooth, *_BETWEEN) * above
+    return np.asarray(bounds), nearest.reshape(-1, 7)

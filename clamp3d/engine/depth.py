@@ -15,11 +15,11 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
-from clamp3d.engine.exact import attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
+from clamp3d.engine.exact import SHARES, attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
 from clamp3d.engine.model import QUICK_TRIANGLES, Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
-from clamp3d.engine.refine import SHARES, from_boxes, refine
+from clamp3d.engine.refine import from_boxes, refine
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import TOLERANCE

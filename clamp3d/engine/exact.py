@@ -5,12 +5,13 @@ Open CASCADE states no error: `TOLERANCE` is taken for it, and the method's name
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.border import distances_across
+from clamp3d.engine.border import Side
 from clamp3d.engine.model import Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
@@ -21,9 +22,13 @@ from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.files.pairs import CommonPart
 from clamp3d.geometry.pose import Array, to_source, to_target
 
+Enough = Callable[[Distance], bool]
+
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
+SHARES = (0.04, 0.015, 0.004)
+"""Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
 _CUTS, _MOST_CUTS = 450.0, 30_000
 """Triangles that are added to a common part's border at most to bound its depth: as many over the chords' share, so
 that coarse samples are not cut for long, and never more than the second, which take two seconds.
@@ -95,11 +100,19 @@ def exact_height(inner: Surface, outer: Surface, solid: Model, T: Array) -> floa
 
 
 def exact_overlap(
-    a: Model, b: Model, T: Array, share: float, *, quick: bool = False, attested: float = 0.0
+    a: Model,
+    b: Model,
+    T: Array,
+    share: float,
+    *,
+    enough: Enough | None = None,
+    quick: bool = False,
+    attested: float = 0.0,
 ) -> Distance:
     """Bounds of the interference of solids that touch or overlap, from points of the border of their common part.
 
     ``share``: how far between the points that border may be off straight lines, of the common part's thickness.
+    ``enough``: what needs no sharper bound; by default none does.
     ``quick``: nothing is known if it takes more than a second to find.
     ``attested``: how deep (mm) a point lies: then some of a common part that is not as deep is missing.
     """
@@ -113,15 +126,30 @@ def exact_overlap(
         return unknown
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    corners, middles, at_most = _deepest_places(shared, min(round(_CUTS / share), _MOST_CUTS))
+    if not all(len(border.triangles) for border in shared.borders):
+        return unknown
+    on_a, on_b = shared.borders
+    # Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
+    sides = [Side.of(on_a, on_b), Side.of(on_b, on_a)]
+    corners, middles = _deepest_places(shared, sides)
     points = np.concatenate([corners, middles])
     depths = depths_in(a, b, T, points)
-    # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
-    most = at_most + max(0.0, -float(depths[:, : len(corners)].min()))
     reached = attested_overlap(points, depths)
-    if most + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
+    # Some of what Open CASCADE calls the common part may lie beside the solids: then it is that inaccurate.
+    beside = max(0.0, -float(depths[:, : len(corners)].min()))
+
+    def bounded(at_most: float) -> Distance:
+        return replace(reached, lower=-at_most - beside - TOLERANCE)
+
+    def end(bound: float, least: float) -> bool:
+        if enough is None:
+            return False
+        return enough(bounded(bound)) or (share > SHARES[-1] and not enough(bounded(least)))
+
+    at_most = max(side.at_most(end, min(round(_CUTS / share), _MOST_CUTS)) for side in sides)
+    if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=unknown.method)
-    return replace(reached, lower=-most - TOLERANCE)
+    return bounded(at_most)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:
@@ -142,19 +170,15 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     return Distance(-_NARROW, method=METHOD)
 
 
-def _deepest_places(shared: CommonPart, cuts: int) -> tuple[Array, Array, float]:
-    """Corners (n, 3) and middles (k, 3) of triangles of a common part's border, and how deep (mm) any point is at most.
+def _deepest_places(shared: CommonPart, sides: list[Side]) -> tuple[Array, Array]:
+    """Corners (n, 3) and middles (k, 3) of triangles of a common part's border that look deepest.
 
-    They are those that look deepest, and some of all other corners. Middles need not lie on the border. Up to ``cuts``
-    triangles are added to sharpen the bound.
-    Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
+    With some of all other corners; middles need not lie on the border.
     """
-    on_a, on_b = shared.borders
-    sides = distances_across(on_a, on_b, cuts), distances_across(on_b, on_a, cuts)
-    corners = np.concatenate([on_a.points, on_b.points])
-    middles = np.concatenate([border.points[border.triangles].mean(axis=1) for border in shared.borders])
+    corners = np.concatenate([border.points for border in shared.borders])
+    middles = np.concatenate([side.pieces.triangles.mean(axis=1) for side in sides])
     order = np.argsort(-np.concatenate([side.corners for side in sides]), kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
     deepest = np.argsort(-np.concatenate([side.middles for side in sides]), kind="stable")[:_PROBED]
-    return corners[tried], middles[deepest], max(side.at_most for side in sides)
+    return corners[tried], middles[deepest]

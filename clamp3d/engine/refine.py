@@ -25,9 +25,6 @@ from clamp3d.geometry.pose import Array, inverse
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
 
-SHARES = (0.04, 0.015, 0.004)
-"""Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
-
 _COINCIDENT = 1e-4
 """Overlap (mm) beyond which there is a common part to ask for; up to it faces coincide, which meshes prove."""
 
@@ -103,7 +100,7 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         if is_doubtful and distance.lower <= meshes.upper:
             yield "exact", distance
     is_found = False
-    for overlap in _common_parts(a, b, T, attested, quick=True):
+    for overlap in _common_parts(a, b, T, enough, attested, quick=True):
         yield "exact", overlap
         is_found = bool(np.isfinite(overlap.lower))
     if not cad_forms:
@@ -111,7 +108,7 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     if finer and is_small:
         yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
     if not is_found:
-        for overlap in _common_parts(a, b, T, attested, quick=False):
+        for overlap in _common_parts(a, b, T, enough, attested, quick=False):
             yield "exact", overlap
     if finer:
         yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
@@ -119,15 +116,16 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
         yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
 
 
-def _common_parts(a: Model, b: Model, T: Array, attested: float, *, quick: bool) -> Iterator[Distance]:
+def _common_parts(a: Model, b: Model, T: Array, enough: Enough, attested: float, *, quick: bool) -> Iterator[Distance]:
     """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
 
     ``quick``: the first, which makes it, within a second, not in five. ``attested``: how deep (mm) a point lies.
     """
-    from clamp3d.engine.exact import exact_overlap
+    from clamp3d.engine.exact import SHARES, exact_overlap
 
     for share in SHARES:
-        overlap = exact_overlap(a, b, T, share, quick=quick and share == SHARES[0], attested=attested)
+        quick_now = quick and share == SHARES[0]
+        overlap = exact_overlap(a, b, T, share, enough=enough, quick=quick_now, attested=attested)
         yield overlap
         if np.isinf(overlap.lower):
             break

@@ -13,8 +13,9 @@ from clamp3d import Scene, check
 from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.border import Side
 from clamp3d.engine.depth import penetration
-from clamp3d.engine.exact import _deepest_places, attested_overlap, exact_distance, exact_overlap, exact_probe
+from clamp3d.engine.exact import SHARES, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
 from clamp3d.engine.model import CAD_CHORDS, Counters, model_of
 from clamp3d.engine.near_faces import near_faces
@@ -216,8 +217,9 @@ def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family,
     for model, border in zip((a, b), part.borders, strict=True):
         middles = border.points[border.triangles].mean(axis=1)[::9]
         assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= border.errors.max()
-    *_, at_most = _deepest_places(part, 1000)
-    for model, border in zip((b, a), part.borders, strict=True):  # the depth of one in the other
+    on_a, on_b = part.borders
+    for model, border, other in ((b, on_a, on_b), (a, on_b, on_a)):  # the depth of one in the other
+        at_most = Side.of(border, other).at_most(lambda *_: False, 1000)
         middles = border.points[border.triangles].mean(axis=1)[::9]
         assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= at_most
 
@@ -259,6 +261,23 @@ def test_the_border_of_a_common_part_may_go_over_into_a_fillet():
     a, b = models_of(rounding.Shape(), rod(4.0, -10.0, 16.0, 0.0094))
     distance = exact_overlap(a, b, np.eye(4), 0.004)
     assert -0.0099 <= distance.lower <= -0.0094 <= distance.upper <= -0.0093
+
+
+@pytest.mark.parametrize("family", ["hexagon_in_bore", "ring_on_shaft", "screw_in_plate"])
+def test_a_bound_of_an_interference_is_no_sharper_than_what_is_to_be_decided(family):
+    """Coarse samples that cannot decide it are given up, the finest ones tell how far it is open."""
+    a, b = models(family, -0.0085, seed=5)
+    for share in SHARES:
+        for most in (1.0, 0.0099, 0.0095, 0.005):
+
+            def enough(distance, most=most):
+                return distance.lower >= -most
+
+            distance = exact_overlap(a, b, np.eye(4), share, enough=enough)
+            assert distance.lower <= -0.0085 <= distance.upper
+            if share == SHARES[-1]:
+                assert enough(distance) == (most > 0.0085)
+                assert distance.lower >= -max(0.0095, most)
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3])
