@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,24 +45,36 @@ class Side(NamedTuple):
         pieces = _Pieces.of(own.points[own.triangles], own.errors, sheets)
         return cls(sheets.whole.surface.distance(own.points), pieces.middles, pieces, sheets)
 
-    def at_most(self, end: End, cuts: int) -> float:
-        """How far (mm) any point is from the other side at most, sharpened until the ``end``.
+    @property
+    def reached(self) -> float:
+        """How far some corner or middle is."""
+        return float(max(self.corners.max(), self.middles.max()))
 
-        The farthest triangles are cut until their bounds are sharp, or ``cuts`` are added.
-        """
-        reached = float(max(self.corners.max(), self.middles.max()))
-        serves, pieces = _SHARP * reached, self.pieces
-        least = serves + float(pieces.off[self.middles.argmax()])  # it may be so much more at that middle
-        bound = float(pieces.at_most.max())
-        pieces = pieces if end(bound, least) else pieces.sharpened(self.other, serves)
-        while True:
-            bound = max(reached, float(pieces.at_most.max()))
-            worst = pieces.at_most > np.maximum(least, pieces.middles + pieces.off + serves - reached)
-            worst &= pieces.at_most >= 0.5 * (least + pieces.at_most[worst].max(initial=0.0))
-            cuts -= int(worst.sum())
-            if not worst.any() or cuts < 0 or end(bound, least):
-                return bound
-            pieces = pieces.halved(worst, self.other, serves)
+
+def greatest_distance(sides: Sequence[Side], end: End, cuts: int) -> float:
+    """How far (mm) any point of sides of a border is from the other side at most, sharpened until the ``end``.
+
+    Of each side the farthest triangles are cut until their bounds are sharp, or ``cuts`` are added.
+    """
+    reached = max(side.reached for side in sides)
+    # It may be so much more at the farthest middle.
+    off = max(float(side.pieces.off[side.middles.argmax()]) for side in sides)
+    return max(_greatest(side, reached, _SHARP * reached + off, end, cuts) for side in sides)
+
+
+def _greatest(side: Side, reached: float, least: float, end: End, cuts: int) -> float:
+    """The same of one side; ``least`` (mm): no bound of all is less, and ``reached`` is what is measured."""
+    serves, pieces = _SHARP * reached, side.pieces
+    if not end(float(pieces.at_most.max()), least):
+        pieces = pieces.sharpened(side.other, serves)
+    while True:
+        bound = max(reached, float(pieces.at_most.max()))
+        worst = pieces.at_most > np.maximum(least, pieces.middles + pieces.off + serves - reached)
+        worst &= pieces.at_most >= 0.5 * (least + pieces.at_most[worst].max(initial=0.0))
+        cuts -= int(worst.sum())
+        if not worst.any() or cuts < 0 or end(bound, least):
+            return bound
+        pieces = pieces.halved(worst, side.other, serves)
 
 
 class _Sheet(NamedTuple):

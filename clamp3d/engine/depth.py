@@ -242,7 +242,11 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, 
     """
     own = Distance()
     if a.exact is not None and b.exact is not None:
-        own = exact_overlap(a, b, meshes.T, SHARES[1], attested=depth)
+
+        def end(bounds: Distance, _: Distance) -> bool:
+            return not thorough and _is_sharp(-bounds.lower, -bounds.upper)
+
+        own = exact_overlap(a, b, meshes.T, SHARES[1], end=end, attested=depth)
         if np.isfinite(own.lower):
             return own
         own = exact_probe(a, b, meshes.T)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.border import Side
+from clamp3d.engine.border import Side, greatest_distance
 from clamp3d.engine.model import Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
@@ -22,7 +22,8 @@ from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.files.pairs import CommonPart
 from clamp3d.geometry.pose import Array, to_source, to_target
 
-Enough = Callable[[Distance], bool]
+End = Callable[[Distance, Distance], bool]
+"""Whether bounds of an interference are sharp enough, or none can be, since none are closer than the second ones."""
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
 _PROBED, _MANY = 8, 16
@@ -105,14 +106,14 @@ def exact_overlap(
     T: Array,
     share: float,
     *,
-    enough: Enough | None = None,
+    end: End = lambda *_: False,
     quick: bool = False,
     attested: float = 0.0,
 ) -> Distance:
     """Bounds of the interference of solids that touch or overlap, from points of the border of their common part.
 
     ``share``: how far between the points that border may be off straight lines, of the common part's thickness.
-    ``enough``: what needs no sharper bound; by default none does.
+    ``end``: where these are not sharpened further, though they could be.
     ``quick``: nothing is known if it takes more than a second to find.
     ``attested``: how deep (mm) a point lies: then some of a common part that is not as deep is missing.
     """
@@ -141,12 +142,10 @@ def exact_overlap(
     def bounded(at_most: float) -> Distance:
         return replace(reached, lower=-at_most - beside - TOLERANCE)
 
-    def end(bound: float, least: float) -> bool:
-        if enough is None:
-            return False
-        return enough(bounded(bound)) or (share > SHARES[-1] and not enough(bounded(least)))
+    def is_end(at_most: float, least: float) -> bool:
+        return end(bounded(at_most), bounded(least))
 
-    at_most = max(side.at_most(end, min(round(_CUTS / share), _MOST_CUTS)) for side in sides)
+    at_most = greatest_distance(sides, is_end, min(round(_CUTS / share), _MOST_CUTS))
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=unknown.method)
     return bounded(at_most)

@@ -123,9 +123,11 @@ def _common_parts(a: Model, b: Model, T: Array, enough: Enough, attested: float,
     """
     from clamp3d.engine.exact import SHARES, exact_overlap
 
+    def end(bounds: Distance, closest: Distance) -> bool:
+        return enough(bounds) or (share != SHARES[-1] and not enough(closest))  # finer samples may tell
+
     for share in SHARES:
-        quick_now = quick and share == SHARES[0]
-        overlap = exact_overlap(a, b, T, share, enough=enough, quick=quick_now, attested=attested)
+        overlap = exact_overlap(a, b, T, share, end=end, quick=quick and share == SHARES[0], attested=attested)
         yield overlap
         if np.isinf(overlap.lower):
             break

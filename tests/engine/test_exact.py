@@ -12,8 +12,9 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from clamp3d import Scene, check
 from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
+from clamp3d.engine import refine as refine_module
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.border import Side
+from clamp3d.engine.border import Side, _Pieces, greatest_distance
 from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import SHARES, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.judge import judge, kind_of_overlap
@@ -217,9 +218,10 @@ def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family,
     for model, border in zip((a, b), part.borders, strict=True):
         middles = border.points[border.triangles].mean(axis=1)[::9]
         assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= border.errors.max()
-    on_a, on_b = part.borders
-    for model, border, other in ((b, on_a, on_b), (a, on_b, on_a)):  # the depth of one in the other
-        at_most = Side.of(border, other).at_most(lambda *_: False, 1000)
+    for model, border, other in zip(
+        (b, a), part.borders, part.borders[::-1], strict=True
+    ):  # the depth of one in the other
+        at_most = greatest_distance([Side.of(border, other)], lambda *_: False, 1000)
         middles = border.points[border.triangles].mean(axis=1)[::9]
         assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= at_most
 
@@ -265,19 +267,30 @@ def test_the_border_of_a_common_part_may_go_over_into_a_fillet():
 
 @pytest.mark.parametrize("family", ["hexagon_in_bore", "ring_on_shaft", "screw_in_plate"])
 def test_a_bound_of_an_interference_is_no_sharper_than_what_is_to_be_decided(family):
-    """Coarse samples that cannot decide it are given up, the finest ones tell how far it is open."""
     a, b = models(family, -0.0085, seed=5)
     for share in SHARES:
         for most in (1.0, 0.0099, 0.0095, 0.005):
-
-            def enough(distance, most=most):
-                return distance.lower >= -most
-
-            distance = exact_overlap(a, b, np.eye(4), share, enough=enough)
+            distance = exact_overlap(a, b, np.eye(4), share, end=lambda bounds, _, m=most: bounds.lower >= -m)
             assert distance.lower <= -0.0085 <= distance.upper
             if share == SHARES[-1]:
-                assert enough(distance) == (most > 0.0085)
+                assert (distance.lower >= -most) == (most > 0.0085)
                 assert distance.lower >= -max(0.0095, most)
+
+
+def test_samples_that_cannot_decide_an_interference_are_given_up_but_for_the_finest(monkeypatch):
+    a, b = models("hexagon_in_bore", -0.0101, seed=5)
+    cuts, halved = [], _Pieces.halved
+
+    def counted(*given):
+        cuts.append(1)
+        return halved(*given)
+
+    monkeypatch.setattr(_Pieces, "halved", counted)
+    answers = []
+    for answer in refine_module._common_parts(a, b, np.eye(4), lambda d: d.lower >= -0.01, 0.0101, quick=True):
+        answers.append((len(cuts), answer.lower))
+    assert [n for n, _ in answers[:2]] == [0, 0] < [answers[2][0]]
+    assert -0.0107 < answers[2][1] <= -0.0101
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3])

@@ -77,7 +77,7 @@ def test_what_counts_as_known():
 def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, deep):
     """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more."""
 
-    def overlap(a, b, T, share, *, quick=False, attested):
+    def overlap(a, b, T, share, *, end, quick=False, attested):
         assert attested == deep
         return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick}")
 
