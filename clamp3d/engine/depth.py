@@ -41,7 +41,7 @@ LONG = 3.0
 """Ratio of a way out to the interference from which on that is bounded by itself: how far a pin is to be moved out of
 its hole says nothing of how much it is too thick.
 """
-_SHARP = 1.1
+_SHARP = 1.05
 """Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
 _STEADY = 10.0
 """Ratio of a way out to what meshes hide from which on finer ones shorten it by no more than a fifth."""

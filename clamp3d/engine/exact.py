@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.border import Side, greatest_distance
+from clamp3d.engine.farthest import Pieces, Sheet, farthest
 from clamp3d.engine.model import Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
@@ -19,7 +19,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.pairs import CommonPart
+from clamp3d.files.pairs import Border, CommonPart
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 End = Callable[[Distance, Distance], bool]
@@ -30,7 +30,7 @@ _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
-_CUTS, _MOST_CUTS = 450.0, 30_000
+_CUTS, _MOST_CUTS = 450.0e3, 200_000
 """Triangles that are added to a common part's border at most to bound its depth: as many over the chords' share, so
 that coarse samples are not cut for long, and never more than the second, which take two seconds.
 """
@@ -131,7 +131,7 @@ def exact_overlap(
         return unknown
     on_a, on_b = shared.borders
     # Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
-    sides = [Side.of(on_a, on_b), Side.of(on_b, on_a)]
+    sides = [_measured(on_a, on_b), _measured(on_b, on_a)]
     corners, middles = _deepest_places(shared, sides)
     points = np.concatenate([corners, middles])
     depths = depths_in(a, b, T, points)
@@ -143,9 +143,9 @@ def exact_overlap(
         return replace(reached, lower=-at_most - beside - TOLERANCE)
 
     def is_end(at_most: float, least: float) -> bool:
-        return end(bounded(at_most), bounded(least))
+        return end(bounded(at_most), bounded(max(least, -reached.upper)))
 
-    at_most = greatest_distance(sides, is_end, min(round(_CUTS / share), _MOST_CUTS))
+    at_most = farthest(sides, is_end, min(round(_CUTS / share), _MOST_CUTS))
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=unknown.method)
     return bounded(at_most)
@@ -169,15 +169,22 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     return Distance(-_NARROW, method=METHOD)
 
 
-def _deepest_places(shared: CommonPart, sides: list[Side]) -> tuple[Array, Array]:
+def _measured(own: Border, other: Border) -> Pieces:
+    """How far one side of a border is from the other."""
+    sheet = Sheet(Surface(other.points, other.triangles), other.errors)
+    return Pieces.of(sheet, own.points[own.triangles], own.errors)
+
+
+def _deepest_places(shared: CommonPart, sides: list[Pieces]) -> tuple[Array, Array]:
     """Corners (n, 3) and middles (k, 3) of triangles of a common part's border that look deepest.
 
     With some of all other corners; middles need not lie on the border.
     """
     corners = np.concatenate([border.points for border in shared.borders])
-    middles = np.concatenate([side.pieces.triangles.mean(axis=1) for side in sides])
-    order = np.argsort(-np.concatenate([side.corners for side in sides]), kind="stable")
+    away = [side.sheet.surface.distance(border.points) for side, border in zip(sides, shared.borders, strict=True)]
+    order = np.argsort(-np.concatenate(away), kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))
+    middles = np.concatenate([side.triangles.mean(axis=1) for side in sides])
     deepest = np.argsort(-np.concatenate([side.middles for side in sides]), kind="stable")[:_PROBED]
     return corners[tried], middles[deepest]

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.engine.farthest import End, Pieces, Sheet, farthest
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry.manifolds import arrays_of
-from clamp3d.geometry.pose import Array, inverse, to_source, to_target
+from clamp3d.geometry.pose import Array, to_source
 from clamp3d.geometry.shells import volume
-from clamp3d.geometry.triangles import closest_points, normals_and_areas, quarters
+from clamp3d.geometry.triangles import normals_and_areas
 
 _INNER = 40
 """Triangles of an overlap under which a point is tried."""
 _CORNERS = 400
 """Corners of an overlap that are measured."""
-_NO_FURTHER = 1e-3
-"""Relative to the greatest distance that was measured: a bound larger by less is sharp."""
-_CLEAR = 1e-7
-"""Relative to the size: so far beyond a plane nothing is on it, whatever is rounded."""
-_HAIR = 1e-9
-"""Relative to the size: a piece that reaches over a border by less is not cut there."""
 
 
 @dataclass(eq=False)
@@ -111,116 +104,17 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     return float(depth[k]), points[k]
 
 
-def thickness(
-    a: Surface, b: Surface, T: Array, shared: Common, end: Callable[[float, float], bool], cuts: int
-) -> float:
+def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: int) -> float:
     """Upper bound (mm) of how deep any point of one mesh's surface lies in the other.
 
-    It is sharpened until ``end(bound, reached)``, of the bound and of a depth that a point has, or ``cuts`` are made.
-
-    Lemma: the distance from a fixed triangle is convex, so over a triangle of the common part it is largest at a
-    corner, and the distance from the whole surface is no larger than that from any one of its triangles. Another is
-    that of `_moves_out`. Infinite where one body may be swallowed whole, since the surfaces then say nothing of its
-    middle, and of a common part with more triangles than it may be cut into.
+    It is sharpened until ``end``, of the bound and of a depth that a point has, or ``cuts`` are made. Infinite where
+    one body may be swallowed whole, since the surfaces then say nothing of its middle, and of a common part with more
+    triangles than it may be cut into.
     """
     if len(shared.faces) > cuts or 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
         return np.inf
-    bound = np.inf
-    for pieces in cut_up(a, b, T, shared.vertices[shared.faces], cuts):
-        bound = float(pieces.at_most.max(initial=0.0))
-        if end(bound, float(pieces.middles.max(initial=0.0))):
-            break
-    return bound
-
-
-class Pieces(NamedTuple):
-    """Triangles (m, 3, 3): how far from either surface their middles (m,) are, and any point of them (m, 2) at most."""
-
-    triangles: Array
-    middles: Array
-    at_most: Array
-
-    @classmethod
-    def of(cls, a: Surface, b: Surface, triangles: Array, T: Array) -> Pieces:
-        """Measured from two surfaces, ``b`` at ``T`` (4, 4) in the frame of ``a`` and the triangles."""
-        (near_a, most_a), (near_b, most_b) = _distances(a, triangles), _distances(b, to_source(T, triangles))
-        return cls(triangles, np.maximum(near_a, near_b), np.stack([most_a, most_b], axis=1))
-
-    def replaced(self, rows: NDArray[np.bool_], by: Pieces) -> Pieces:
-        """With others in place of some."""
-        return Pieces(*(np.concatenate([own[~rows], new]) for own, new in zip(self, by, strict=True)))
-
-
-def cut_up(a: Surface, b: Surface, T: Array, triangles: Array, most: int) -> Iterator[Pieces]:
-    """Triangles (m, 3, 3), and what is left when the furthest are cut, again and again, until ``most`` are added."""
-    pieces = Pieces.of(a, b, triangles, T)
-    while True:
-        yield pieces
-        # What is no further than a middle that was measured cannot be the furthest.
-        bound = max(0.5 * pieces.at_most.max(initial=0.0), (1.0 + _NO_FURTHER) * pieces.middles.max(initial=0.0))
-        furthest = pieces.at_most.max(axis=1) > bound
-        most -= 2 * int(furthest.sum())  # three or four in place of one
-        if most < 0 or not furthest.any():
-            return
-        from_a = pieces.at_most[:, 0] >= pieces.at_most[:, 1]
-        cut = [_cut(a, np.eye(4), pieces.triangles[furthest & from_a])]
-        cut.append(_cut(b, inverse(T), pieces.triangles[furthest & ~from_a]))
-        pieces = pieces.replaced(furthest, Pieces.of(a, b, np.concatenate(cut), T))
-
-
-def _distances(surface: Surface, triangles: Array) -> tuple[Array, Array]:
-    """Distance (m,) of the middles of triangles (m, 3, 3) of the common part from a surface, and of any point at most.
-
-    The least of two bounds: to the triangle nearest to the middle, and the length of a move that takes all of it out.
-    """
-    distance, face, foot = surface.nearest(triangles.mean(axis=1))
-    chosen = np.repeat(surface.vertices[surface.faces[face]], 3, axis=0)
-    corners = triangles.reshape(-1, 3)
-    at_most = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
-    move = _moves_out(surface, triangles, foot, surface.normals[face])
-    length = np.linalg.norm(move, axis=1)
-    rows = np.flatnonzero(length < at_most)
-    rows = rows[surface.is_outside(triangles[rows] + move[rows, None])]
-    at_most[rows] = length[rows]
-    return distance, np.asarray(at_most)
-
-
-def _moves_out(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
-    """Moves (m, 3) that take triangles (m, 3, 3) beyond the planes through ``feet`` (m, 3), along their normals.
-
-    Lemma: who leaves a body crosses its surface, so a point of the body is no further from that than it is moved to be
-    outside.
-    """
-    height = np.einsum("mcj,mj->mc", feet[:, None] - triangles, normals).max(axis=1)
-    return np.asarray((np.maximum(height, 0.0) + _CLEAR * max(1.0, surface.scale))[:, None] * normals)
-
-
-def _cut(surface: Surface, T: Array, pieces: Array) -> Array:
-    """Triangles (k, 3, 3) cut where they reach over a border of the surface's triangle nearest to their middle.
-
-    Each is cut along one border, upright; those that reach over none are cut in four. ``T`` (4, 4) takes them to the
-    surface's frame.
-    """
-    local = to_target(T, pieces)
-    _, face, _ = surface.nearest(local.mean(axis=1))
-    corners = surface.vertices[surface.faces[face]]
-    inward = np.cross(surface.normals[face][:, None], np.roll(corners, -1, axis=1) - corners)
-    inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-300)[:, :, None]
-    height = np.einsum("mbj,mbcj->mbc", inward, local[:, None] - corners[:, :, None])
-    reach = np.minimum(height.max(axis=2), -height.min(axis=2))
-    border = reach.argmax(axis=1)
-    rows = np.arange(len(pieces))
-    over = reach[rows, border] > _HAIR * surface.scale
-    return np.concatenate([_split(pieces[over], height[rows, border][over]), quarters(pieces[~over])])
-
-
-def _split(pieces: Array, height: Array) -> Array:
-    """Triangles (3 m, 3, 3): each of (m, 3, 3) cut where the height (m, 3) of its corners changes sign."""
-    above = height > 0.0
-    lone = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)  # the corner that is alone on its side
-    order = (lone[:, None] + np.arange(3)) % 3
-    rows = np.arange(len(pieces))[:, None]
-    (a, b, c), (h, i, j) = pieces[rows, order].transpose(1, 0, 2), height[rows, order].T
-    ab = a + (h / (h - i))[:, None] * (b - a)
-    ac = a + (h / (h - j))[:, None] * (c - a)
-    return np.concatenate([np.stack(corners, axis=1) for corners in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
+    triangles = shared.vertices[shared.faces]
+    # Those that lie on a surface themselves are no way from it.
+    sides = (a, triangles), (b, to_source(T, triangles))
+    exact = [(Sheet(surface, np.zeros(len(surface.faces))), pieces) for surface, pieces in sides]
+    return farthest([Pieces.of(sheet, pieces, np.zeros(len(pieces))) for sheet, pieces in exact], end, cuts)

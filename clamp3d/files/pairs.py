@@ -25,7 +25,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, SAMPLED, covers, triangles_of
+from clamp3d.files.tessellation import ANGLE, SAMPLED, border_sag, covers, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
 from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
@@ -52,12 +52,11 @@ _MOST_SAMPLES = 100_000
 class Border:
     """What of a common part's border lies on one solid, as triangles: ``points`` (n, 3), ``triangles`` (m, 3).
 
-    ``face`` (m,): the number of the common part's face that each is on; ``errors`` (m,): how far (mm) it is from it.
+    ``errors`` (m,): how far (mm) each is from the common part's face that it is on.
     """
 
     points: Array
     triangles: IntArray
-    face: IntArray
     errors: Array
 
 
@@ -209,13 +208,14 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     meshes = _meshed(shape, sag)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[Border], ...] = ([], [])
-    for number, (face, mesh) in enumerate(zip(explore(shape, "FACE"), meshes, strict=True)):
-        uv, off = _samples(face, *mesh, sag)
+    for face, mesh in zip(explore(shape, "FACE"), meshes, strict=True):
+        uv, source, off = _samples(face, *mesh, sag)
         if not len(uv):
             continue
         points, rows = distinct_points_on(face, uv.reshape(-1, 2))
         triangles = rows.reshape(-1, 3)
-        border = Border(points, triangles, np.full(len(triangles), number), np.full(len(triangles), SAMPLED * off))
+        errors = np.maximum(SAMPLED * off, border_sag(face, *mesh[:2])[source])
+        border = Border(points, triangles, errors)
         _, areas = normals_and_areas(points[triangles])
         # Beside its border a face may be as near to the other solid's as to its own.
         (middle,) = points_on(face, uv[areas.argmax()].mean(axis=0, keepdims=True))
@@ -249,12 +249,11 @@ def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
 def _joined(side: list[Border]) -> Border:
     """The samples of some faces as one."""
     if not side:
-        return Border(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
+        return Border(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), np.empty(0))
     starts = np.cumsum([0, *(len(border.points) for border in side[:-1])])
     return Border(
         np.vstack([border.points for border in side]),
         np.vstack([border.triangles + start for border, start in zip(side, starts, strict=True)]),
-        np.concatenate([border.face for border in side]),
         np.concatenate([border.errors for border in side]),
     )
 
@@ -269,13 +268,14 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, float]:
-    """Triangles (m, 3, 2) of a meshed face in its surface's parameters, and how far (mm) an edge's middle is from it.
+def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, IntArray, float]:
+    """Triangles (k, 3, 2) of a face in its surface's parameters, and how far (mm) an edge's middle is from it.
 
-    They are cut in two at the middle of an edge until no middle is farther than ``sag`` mm, or there are too many.
+    Those of its mesh are cut in two at the middle of an edge until no middle is farther than ``sag`` mm, or there are
+    too many; the second array (k,) tells which each is of.
     """
-    corners, ends = uv[triangles], points[triangles]
-    finished, count, farthest = [np.empty((0, 3, 2))], len(triangles), 0.0
+    corners, ends, source = uv[triangles], points[triangles], np.arange(len(triangles))
+    finished, sources, count, farthest = [np.empty((0, 3, 2))], [source[:0]], len(triangles), 0.0
     while len(corners):
         middles = edge_middles(corners)
         true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
@@ -286,12 +286,14 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
         if count > _MOST_SAMPLES:
             wide[:] = False
         finished.append(corners[~wide])
+        sources.append(source[~wide])
         farthest = max(farthest, float(off[~wide].max(initial=0.0)))
         count += int(wide.sum())
         edge = off[wide].argmax(axis=1)
         corners = halves(corners[wide], middles[wide], edge)
         ends = halves(ends[wide], true[wide], edge)
-    return np.concatenate(finished), farthest
+        source = np.tile(source[wide], 2)
+    return np.concatenate(finished), np.concatenate(sources), farthest
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -92,7 +92,7 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
         triples.append(triangles + count)
         count += len(points)
         numbers.append(np.full(len(triangles), k))
-        errors.append(np.maximum(deviation, _border_sag(face, points, triangles)))
+        errors.append(np.maximum(deviation, border_sag(face, points, triangles)))
     if not corners:
         raise Clamp3dError("Open CASCADE makes no triangles of it")
     # Faces that share an edge have the same points on it, so equal coordinates are one vertex.
@@ -184,7 +184,7 @@ def _numbers(count: int) -> Any:
     return (made or occ.TColStd_Array1OfReal)(1, count)
 
 
-def _border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
+def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
     sag_of: dict[int, float] = {}
     for edge, nodes, at in _border(face):

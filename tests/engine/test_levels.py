@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from clamp3d import Scene, Verdict, check, distance, shapes
 from clamp3d.engine.batch import bounds_at_poses
 from clamp3d.engine.facets import rods_distance
+from clamp3d.engine.farthest import Pieces, Sheet, farthest
 from clamp3d.engine.mesh_distance import are_apart, meshes_distance, nearest_points, surface_distance
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.overlap import cut_up
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.pose import inverse, rotation, to_source, to_target, translation
+from clamp3d.geometry.pose import inverse, rotation, to_target, translation
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.geometry.profile import Profile
 from clamp3d.testing import assert_distance, body
@@ -73,30 +73,38 @@ def test_errors_of_both_meshes_widen_the_bounds_by_their_sum(gap, e, f):
         assert (decided.lower == -math.inf) == (gap < 0.0)
 
 
-def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound():
-    """Triangles in a bracket and a box: their bounds close in on the furthest point, whatever is cut and how."""
-    rng, one, other = np.random.default_rng(4), Surface(BRACKET.vertices, BRACKET.faces), box_mesh((30.0, 20.0, 10.0))
+@pytest.mark.parametrize("closed", [True, False])
+def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound(closed):
+    """Triangles in one wall of a bracket: their bounds close in on the furthest point, whatever is cut and how."""
+    rng = np.random.default_rng(4)
+    bracket = Surface(BRACKET.vertices, BRACKET.faces if closed else BRACKET.faces[1:])
     weights = rng.dirichlet(np.ones(3), 200)
-    for k in range(8):
-        T = TURNED if k else np.eye(4)
-        inside = rng.uniform((0.0, 0.0, 0.0), (5.0, 30.0, 20.0), (2000, 3))  # of one of its walls
-        inside = inside[(np.abs(to_source(T, inside)) <= (15.0, 10.0, 5.0)).all(axis=1)]
-        triangles = inside[:12].reshape(4, 3, 3)
-        first, last = None, None
-        for pieces in cut_up(one, other, T, triangles, 4000):
-            area = trimesh.triangles.area(pieces.triangles).sum()
-            first, last = area if first is None else first, pieces
-            assert area == pytest.approx(first, rel=1e-9)
-        points = np.einsum("wc,mcx->mwx", weights, last.triangles)
-        for k, (surface, local) in enumerate(((one, points), (other, to_source(T, points)))):
-            away = surface.distance(local.reshape(-1, 3)).reshape(local.shape[:2])
-            assert (last.at_most[:, k] >= away.max(axis=1) - 1e-9).all()
-        middles = last.triangles.mean(axis=1)
-        assert last.middles == pytest.approx(np.maximum(one.distance(middles), other.distance(to_source(T, middles))))
-        points = np.einsum("wc,mcx->mwx", rng.dirichlet(np.ones(3), 6000), triangles).reshape(-1, 3)
-        truth = np.maximum(one.distance(points), other.distance(to_source(T, points))).max()
-        assert truth - 1e-9 <= last.at_most.max() <= 1.03 * truth
-        assert len(last.triangles) <= 4 + 6000
+    for _ in range(8):
+        triangles = rng.uniform((0.0, 0.0, 0.0), (5.0, 30.0, 20.0), (4, 3, 3))
+        off = rng.choice([0.0, 0.01], (2, len(bracket.faces)))
+        pieces = Pieces.of(Sheet(bracket, off[0]), triangles, off[1, :4])
+        every = [pieces]
+
+        def end(bound, least):
+            assert bound >= least - 1e-9
+            return bound <= 1.01 * least
+
+        sharp = farthest([pieces], end, 40_000)
+        for k in range(60):
+            pieces = pieces.cut(pieces.at_most >= (0.0 if k < 2 else np.sort(pieces.at_most)[-8]))
+            every.append(pieces)
+        area = trimesh.triangles.area(triangles).sum()
+        for now in every:
+            assert trimesh.triangles.area(now.triangles).sum() == pytest.approx(area, rel=1e-9)
+            middles = now.triangles.mean(axis=1)
+            assert now.middles == pytest.approx(bracket.distance(middles))
+            assert (now.off >= now.errors).all()
+        points = np.einsum("wc,mcx->mwx", weights, pieces.triangles)
+        away = bracket.distance(points.reshape(-1, 3)).reshape(points.shape[:2]).max(axis=1)
+        assert (pieces.at_most >= away + pieces.errors - 1e-9).all()
+        corners = pieces.triangles.reshape(-1, 3)
+        truth = max(bracket.distance(corners).max(), pieces.middles.max())
+        assert truth + off.min() - 1e-9 <= sharp <= 1.02 * truth + 0.02
 
 
 def test_triangles_are_outside_only_where_no_point_of_them_is_inside():

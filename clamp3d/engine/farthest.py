@@ -1,0 +1,139 @@
+"""How far any point of some triangles is from a surface at most: that bounds how deep an overlap is.
+
+Lemma: the distance from a fixed triangle is convex, so over another one it is largest at a corner; and no point is
+farther from a surface than from any one of its triangles. So triangles are cut until each is above one of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clamp3d.engine.surface import Surface
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
+from clamp3d.geometry.triangles import closest_points, edge_middles, halves
+
+_SHARP = 1.001
+"""Ratio of a bound to the greatest distance that was measured from which on it is not sharpened."""
+_CLEAR = 1e-7
+"""Relative to the size: so far beyond a plane nothing is on it, whatever is rounded."""
+_HAIR = 1e-9
+"""Relative to the size: a piece that reaches over a border by less is not cut there."""
+
+End = Callable[[float, float], bool]
+"""Whether a bound (mm) is sharp enough, or none can be, since each is at least the second number (mm)."""
+
+
+class Sheet(NamedTuple):
+    """A surface, and how far (m,) mm each of its triangles is off."""
+
+    surface: Surface
+    errors: Array
+
+
+class Pieces(NamedTuple):
+    """Triangles (m, 3, 3), each off by ``errors`` (m,) mm, and how far (mm) they are from a sheet.
+
+    ``middles`` (m,): their middles, from triangle ``nearest`` (m,); ``off`` (m,): the errors of both;
+    ``at_most`` (m,): any point of what they stand for, from what the sheet stands for.
+    """
+
+    sheet: Sheet
+    triangles: Array
+    errors: Array
+    nearest: IntArray
+    middles: Array
+    off: Array
+    at_most: Array
+
+    @classmethod
+    def of(cls, sheet: Sheet, triangles: Array, errors: Array) -> Pieces:
+        """Measured: the least of the distance from one triangle and of a move that takes a piece out of the surface."""
+        surface = sheet.surface
+        middles, nearest, foot = surface.nearest(triangles.mean(axis=1))
+        off = errors + sheet.errors[nearest]
+        chosen = np.repeat(surface.vertices[surface.faces[nearest]], 3, axis=0)
+        corners = triangles.reshape(-1, 3)
+        at_most = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
+        move = _moves_out(surface, triangles, foot, surface.normals[nearest])
+        length = np.linalg.norm(move, axis=1)
+        rows = np.flatnonzero(length < at_most)
+        rows = rows[surface.is_outside(triangles[rows] + move[rows, None])]
+        at_most[rows] = length[rows]
+        return cls(sheet, triangles, errors, nearest, middles, off, at_most + off)
+
+    @property
+    def reached(self) -> float:
+        """What no bound of all of them is less than."""
+        return float((self.middles + self.off).max(initial=0.0))
+
+    def cut(self, rows: NDArray[np.bool_]) -> Pieces:
+        """With some of them cut: along a border of the triangle nearest to them, or in half where all is above it."""
+        new, source = self._cuts(np.flatnonzero(rows))
+        both = zip(self[1:], Pieces.of(self.sheet, new, self.errors[source])[1:], strict=True)
+        return Pieces(self.sheet, *(np.concatenate([own[~rows], added]) for own, added in both))
+
+    def _cuts(self, rows: IntArray) -> tuple[Array, IntArray]:
+        """Triangles (k, 3, 3) that pieces are cut into, and the row (k,) of the piece that each is of."""
+        pieces, nearest, surface = self.triangles[rows], self.nearest[rows], self.sheet.surface
+        corners = surface.vertices[surface.faces[nearest]]
+        inward = np.cross(surface.normals[nearest][:, None], np.roll(corners, -1, axis=1) - corners)
+        inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-300)[:, :, None]
+        height = np.einsum("mbj,mbcj->mbc", inward, pieces[:, None] - corners[:, :, None])
+        reach = np.minimum(height.max(axis=2), -height.min(axis=2))
+        border = reach.argmax(axis=1)
+        each = np.arange(len(rows))
+        over = reach[each, border] > _HAIR * surface.scale
+        above = pieces[~over]
+        longest = np.linalg.norm(np.roll(above, -1, axis=1) - above, axis=2).argmax(axis=1)
+        new = [_split(pieces[over], height[each, border][over]), halves(above, edge_middles(above), longest)]
+        return np.concatenate(new), np.concatenate([np.tile(rows[over], 3), np.tile(rows[~over], 2)])
+
+
+def farthest(every: Sequence[Pieces], end: End, cuts: int) -> float:
+    """How far (mm) any point of pieces, each from its sheet, is at most, sharpened until the ``end``.
+
+    Of each those whose bounds are largest are cut until they are sharp, or ``cuts`` triangles are added.
+    """
+    reached = bound = max(pieces.reached for pieces in every)
+    for pieces in every:
+        bound = max(bound, _farthest(pieces, bound, lambda most, least: end(most, max(least, reached)), cuts))
+    return bound
+
+
+def _farthest(pieces: Pieces, floor: float, end: End, cuts: int) -> float:
+    """The same of some of them, where what is less than ``floor`` (mm) does not matter."""
+    while True:
+        bound = float(pieces.at_most.max(initial=0.0))
+        sharp = max(floor, float((_SHARP * pieces.middles + pieces.off).max(initial=0.0)))
+        largest = (pieces.at_most > sharp) & (pieces.at_most >= 0.5 * (sharp + bound))
+        cuts -= 2 * int(largest.sum())
+        if not largest.any() or cuts < 0 or end(bound, pieces.reached):
+            return bound
+        pieces = pieces.cut(largest)
+
+
+def _moves_out(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
+    """Moves (m, 3) that take triangles (m, 3, 3) beyond the planes through ``feet`` (m, 3), along their normals.
+
+    Lemma: who leaves a body crosses its surface, so a point of the body is no further from that than it is moved to be
+    outside.
+    """
+    height = np.einsum("mcj,mj->mc", feet[:, None] - triangles, normals).max(axis=1)
+    return np.asarray((np.maximum(height, 0.0) + _CLEAR * max(1.0, surface.scale))[:, None] * normals)
+
+
+def _split(pieces: Array, height: Array) -> Array:
+    """Triangles (3 m, 3, 3): each of (m, 3, 3) cut where the height (m, 3) of its corners changes sign."""
+    above = height > 0.0
+    lone = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)  # the corner that is alone on its side
+    order = (lone[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(pieces))[:, None]
+    (a, b, c), (h, i, j) = pieces[rows, order].transpose(1, 0, 2), height[rows, order].T
+    ab = a + (h / (h - i))[:, None] * (b - a)
+    ac = a + (h / (h - j))[:, None] * (c - a)
+    return np.concatenate([np.stack(corners, axis=1) for corners in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
