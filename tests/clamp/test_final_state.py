@@ -182,6 +182,16 @@ def test_where_wires_begin_and_where_they_escape_by_hand(clamp):
                 assert section.escaped(moved) == WIRES[i : i + out]
 
 
+def test_a_wire_about_the_middle_of_a_groove_has_the_curvature_of_a_groove_that_it_all_but_fills(clamp):
+    """There no point of the arc is nearest: 1e-9 of its radius stands for the distance of the centres, which is zero."""
+    section = Section(clamp, Cas())
+    q = section.open_state(60.0)
+    q[:2] = section.arc_centres(q, "P6")[0]
+    (row,) = (row for row in section.gaps(q).rows if (row.surface, row.round, row.feature) == ("P1", "P6", "arc"))
+    assert row.value == pytest.approx(section.least_slack, abs=1e-12)
+    assert row.curvature == pytest.approx(-1e9 / 23.8012)
+
+
 def test_curvatures_agree_with_differences_of_gradients(clamp):
     """Of every gap alone: wires in arcs and on lips, beside the splints' edges, faces, slot, saddle."""
     rng, h, seen = np.random.default_rng(5), 1e-5, set()
