@@ -183,7 +183,7 @@ def test_where_wires_begin_and_where_they_escape_by_hand(clamp):
 
 
 def test_a_wire_about_the_middle_of_a_groove_has_the_curvature_of_a_groove_that_it_all_but_fills(clamp):
-    """There no point of the arc is nearest: 1e-9 of its radius stands for the distance of the centres, which is zero."""
+    """No point of the arc is nearest then; for the centres' distance, which is zero, 1e-9 of its radius stands."""
     section = Section(clamp, Cas())
     q = section.open_state(60.0)
     q[:2] = section.arc_centres(q, "P6")[0]
