@@ -21,6 +21,8 @@ _SHARP = 1.001
 """Ratio of a bound to the greatest distance that was measured from which on it is not sharpened."""
 _CLEAR = 1e-7
 """Relative to the size: so far beyond a plane nothing is on it, whatever is rounded."""
+_BENT = 1.02
+"""So much further than beyond such a plane pieces are moved across a surface that is open, and may be bent."""
 _HAIR = 1e-9
 """Relative to the size: a piece that reaches over a border by less is not cut there."""
 
@@ -58,13 +60,17 @@ class Pieces(NamedTuple):
         off = errors + sheet.errors[nearest]
         chosen = np.repeat(surface.vertices[surface.faces[nearest]], 3, axis=0)
         corners = triangles.reshape(-1, 3)
-        at_most = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
-        move = _moves_out(surface, triangles, foot, surface.normals[nearest])
-        length = np.linalg.norm(move, axis=1)
-        rows = np.flatnonzero(length < at_most)
-        rows = rows[surface.is_outside(triangles[rows] + move[rows, None])]
-        at_most[rows] = length[rows]
-        return cls(sheet, triangles, errors, nearest, middles, off, at_most + off)
+        above = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
+        at_most = above + off
+        moves = _moves_beyond(surface, triangles, foot, surface.normals[nearest])
+        moved = np.linalg.norm(moves, axis=1) + errors + sheet.errors.max(initial=0.0)
+        rows = np.flatnonzero(moved < at_most)
+        if surface.has_sides:
+            rows = rows[surface.is_outside(triangles[rows] + moves[rows, None])]
+        else:
+            rows = rows[surface.is_crossed(triangles[rows], moves[rows])]
+        at_most[rows] = moved[rows]
+        return cls(sheet, triangles, errors, nearest, middles, off, at_most)
 
     @property
     def reached(self) -> float:
@@ -90,7 +96,8 @@ class Pieces(NamedTuple):
         over = reach[each, border] > _HAIR * surface.scale
         above = pieces[~over]
         longest = np.linalg.norm(np.roll(above, -1, axis=1) - above, axis=2).argmax(axis=1)
-        new = [_split(pieces[over], height[each, border][over]), halves(above, edge_middles(above), longest)]
+        middles = edge_middles(above)[np.arange(len(above)), longest]
+        new = [_split(pieces[over], height[each, border][over]), halves(above, longest, middles)]
         return np.concatenate(new), np.concatenate([np.tile(rows[over], 3), np.tile(rows[~over], 2)])
 
 
@@ -117,14 +124,14 @@ def _farthest(pieces: Pieces, floor: float, end: End, cuts: int) -> float:
         pieces = pieces.cut(largest)
 
 
-def _moves_out(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
+def _moves_beyond(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
     """Moves (m, 3) that take triangles (m, 3, 3) beyond the planes through ``feet`` (m, 3), along their normals.
 
-    Lemma: who leaves a body crosses its surface, so a point of the body is no further from that than it is moved to be
-    outside.
+    Lemma: a point is no further from a surface than it is moved to cross it, as who leaves a body does.
     """
     height = np.einsum("mcj,mj->mc", feet[:, None] - triangles, normals).max(axis=1)
-    return np.asarray((np.maximum(height, 0.0) + _CLEAR * max(1.0, surface.scale))[:, None] * normals)
+    height = np.maximum(height, 0.0) * (1.0 if surface.has_sides else _BENT)
+    return np.asarray((height + _CLEAR * max(1.0, surface.scale))[:, None] * normals)
 
 
 def _split(pieces: Array, height: Array) -> Array:

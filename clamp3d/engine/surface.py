@@ -141,7 +141,7 @@ class Surface:
             return np.asarray(inside)
         near = np.ascontiguousarray(points[rows], dtype=np.float64)
         behind, is_certain, away = self._behind_nearest(near)
-        is_far = self._has_sides & (away > _FAR * self.scale)
+        is_far = self.has_sides & (away > _FAR * self.scale)
         for rounded in (False, True):
             some = ~is_certain & (is_far == rounded)
             turns = winding_numbers(self.vertices, self.faces, near[some], rounded=rounded)
@@ -158,32 +158,87 @@ class Surface:
         inward = np.cross(normal[:, None], sides)
         margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
         away = np.einsum("ki,ki->k", points - foot, normal)
-        is_certain = self._has_sides & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
+        is_certain = self.has_sides & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
         return away < 0.0, np.asarray(is_certain), distance
 
     @cached_property
-    def _has_sides(self) -> bool:
+    def has_sides(self) -> bool:
         """Whether each triangle has the part on one side, and what is outside on the other."""
         return self.is_simple and is_closed(self.faces)
 
     def is_outside(self, triangles: Array) -> NDArray[np.bool_]:
         """Which of triangles (m, 3, 3) certainly have no point in common with the closed body."""
+        outside = np.zeros(len(triangles), dtype=bool)
+        if self.has_sides:
+            outside[:] = ~self.may_meet(triangles)
+            behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
+            outside[outside] = is_certain & ~behind
+        return outside
+
+    def is_crossed(self, triangles: Array, moves: Array) -> NDArray[np.bool_]:
+        """Which of triangles (m, 3, 3) certainly cross the surface with every point on their moves (m, 3).
+
+        Lemma: the number of times that a segment crosses a surface is odd or even alike for all segments that one can
+        be shifted to without an end on the surface, or the surface's border on the segment.
+        """
+        middles, length = triangles.mean(axis=1), np.linalg.norm(moves, axis=1)
+        radius = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1, initial=0.0)
+        rows = np.flatnonzero(self._from_border(middles) > radius + length)
+        rows = rows[self._crosses_once(middles[rows], moves[rows])]
+        for ends in (triangles, triangles + moves[:, None]):
+            rows = rows[~self.may_meet(ends[rows])]
+        crossed = np.zeros(len(triangles), dtype=bool)
+        crossed[rows] = True
+        return crossed
+
+    def _from_border(self, points: Array) -> Array:
+        """Distance (k,) of points (k, 3) from the edges that an odd number of triangles has."""
+        if not (len(self._border) and len(points)):
+            return np.full(len(points), np.inf)
+        square, *_ = self._border_tree.squared_distance(self.vertices, self._border, np.ascontiguousarray(points))
+        return np.asarray(np.sqrt(np.atleast_1d(square)))
+
+    @cached_property
+    def _border(self) -> NDArray[np.int64]:
+        sides = np.sort(self.faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
+        edges, count = np.unique(sides, axis=0, return_counts=True)
+        return np.ascontiguousarray(edges[count % 2 == 1])
+
+    @cached_property
+    def _border_tree(self) -> Any:
+        import igl
+
+        tree = igl.AABB()
+        tree.init(self.vertices, self._border)
+        return tree
+
+    def _crosses_once(self, starts: Array, moves: Array) -> NDArray[np.bool_]:
+        """Which segments from points (k, 3) meet the surface within one triangle, and nowhere else."""
+        length = np.linalg.norm(moves, axis=1)
+        hits = []
+        for start, way in ((starts, moves), (starts + moves, -moves)):
+            rays = np.ascontiguousarray(start), np.ascontiguousarray(way / length[:, None])
+            hits.append(self._tree.intersect_ray_first(self.vertices, self.faces, *rays))
+        (first, ahead, at), (_, behind, _) = hits
+        is_one = (first >= 0) & (np.abs(ahead + behind - length) <= 1e-9 * self.scale)
+        at = at[is_one]  # of those without a hit there is none
+        is_one[is_one] = np.column_stack([at, 1.0 - at.sum(axis=1)]).min(axis=1, initial=1.0) > _MIDDLE
+        return np.asarray(is_one)
+
+    def may_meet(self, triangles: Array) -> NDArray[np.bool_]:
+        """Which of triangles (m, 3, 3) have a point in common with the surface, as far as is known."""
         import fcl
 
-        if not (len(triangles) and self._has_sides):
-            return np.zeros(len(triangles), dtype=bool)
+        if not len(triangles):
+            return np.zeros(0, dtype=bool)
         corners = np.ascontiguousarray(triangles.reshape(-1, 3))
         loose = fcl_tree(corners, np.arange(len(corners)).reshape(-1, 3))
         most = _CONTACTS * len(triangles)
         result = fcl.CollisionResult()
         fcl.collide(*fcl_pair(loose, self.bvh, np.eye(4)), fcl.CollisionRequest(num_max_contacts=most), result)
-        if len(result.contacts) >= most:  # some may be missing
-            return np.zeros(len(triangles), dtype=bool)
-        outside = np.ones(len(triangles), dtype=bool)
-        outside[[contact.b1 for contact in result.contacts]] = False
-        behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
-        outside[outside] = is_certain & ~behind
-        return outside
+        meet = np.full(len(triangles), len(result.contacts) >= most)  # then some may be missing
+        meet[[contact.b1 for contact in result.contacts]] = True
+        return meet
 
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""

@@ -79,18 +79,18 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
 
 def _canonical(face: Any) -> tuple[int, Array, Array]:
     """Kind, frame (4, 3) and sizes (2,) of a face's surface, also where a file gives it as a spline."""
-    kind, frame, size = _form(occ.BRepAdaptor_Surface(face))
+    kind, frame, size = form_of(occ.BRepAdaptor_Surface(face))
     spline = occ.BRep_Tool.Surface_s(face)
     if kind == OTHER and isinstance(spline, occ.Geom_BSplineSurface):
         plain = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(_ALIKE)
         if plain is not None:
-            form = _form(occ.GeomAdaptor_Surface(plain))
+            form = form_of(occ.GeomAdaptor_Surface(plain))
             if _coincides(spline, *form):
                 return form
     return kind, frame, size
 
 
-def _form(surface: Any) -> tuple[int, Array, Array]:
+def form_of(surface: Any) -> tuple[int, Array, Array]:
     """Kind, frame (4, 3) and sizes (2,) of a BRepAdaptor_Surface or GeomAdaptor_Surface."""
     name, size = surface.GetType().name.removeprefix("GeomAbs_").lower(), np.zeros(2)
     if name not in _SIZES:
@@ -143,7 +143,7 @@ def points_on(face: Any, uv: Array) -> Array:
     Formulas as in its `ElSLib`: it takes a microsecond and more for each point by itself.
     """
     surface = occ.BRepAdaptor_Surface(face)
-    kind, frame, size = _form(surface)
+    kind, frame, size = form_of(surface)
     if kind == OTHER:
         return np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
     u, v = uv.T

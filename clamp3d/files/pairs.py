@@ -11,7 +11,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.boundary import Boundary, Side
-from clamp3d.files.faces import SPHERE, distinct_points_on, points_on, surfaces
+from clamp3d.files.faces import OTHER, SPHERE, distinct_points_on, form_of, height, points_on, surfaces
 from clamp3d.files.open_cascade import (
     TOLERANCE,
     area_of,
@@ -25,7 +25,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, SAMPLED, border_sag, covers, triangles_of
+from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
 from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
@@ -214,7 +214,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
             continue
         points, rows = distinct_points_on(face, uv.reshape(-1, 2))
         triangles = rows.reshape(-1, 3)
-        errors = np.maximum(SAMPLED * off, border_sag(face, *mesh[:2])[source])
+        errors = np.maximum(off, border_sag(face, *mesh[:2])[source])
         border = Border(points, triangles, errors)
         _, areas = normals_and_areas(points[triangles])
         # Beside its border a face may be as near to the other solid's as to its own.
@@ -268,32 +268,36 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, IntArray, float]:
-    """Triangles (k, 3, 2) of a face in its surface's parameters, and how far (mm) an edge's middle is from it.
+def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, IntArray, Array]:
+    """Triangles (k, 3, 2) of a face in its surface's parameters, which of its mesh (k,) each is of, and how far off.
 
-    Those of its mesh are cut in two at the middle of an edge until no middle is farther than ``sag`` mm, or there are
-    too many; the second array (k,) tells which each is of.
+    They are cut in two at the middle of an edge until no edge's middle is farther than ``sag`` mm from the surface, or
+    there are too many.
     """
+    kind, frame, size = form_of(occ.BRepAdaptor_Surface(face))
     corners, ends, source = uv[triangles], points[triangles], np.arange(len(triangles))
-    finished, sources, count, farthest = [np.empty((0, 3, 2))], [source[:0]], len(triangles), 0.0
+    finished = [(corners[:0], source[:0], np.empty(0))]
+    count = len(triangles)
     while len(corners):
-        middles = edge_middles(corners)
-        true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
-        off = np.linalg.norm(true - edge_middles(ends), axis=2)
-        wide = off.max(axis=1) > sag
+        middles, chords = edge_middles(corners), edge_middles(ends)
+        if kind == OTHER:
+            off = np.linalg.norm(points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3) - chords, axis=2)
+        else:
+            off = np.abs(height(kind, frame, size, chords.reshape(-1, 3))).reshape(-1, 3)
+        wide, length = off.max(axis=1) > sag, off
         if count < _SAMPLES and not wide.any():
-            wide[:], off = True, np.linalg.norm(np.roll(ends, -1, axis=1) - ends, axis=2)
+            wide[:], length = True, np.linalg.norm(np.roll(ends, -1, axis=1) - ends, axis=2)
         if count > _MOST_SAMPLES:
             wide[:] = False
-        finished.append(corners[~wide])
-        sources.append(source[~wide])
-        farthest = max(farthest, float(off[~wide].max(initial=0.0)))
+        most = sag_factors(kind, frame, ends[~wide]) * off[~wide].max(axis=1)
+        finished.append((corners[~wide], source[~wide], most))
         count += int(wide.sum())
-        edge = off[wide].argmax(axis=1)
-        corners = halves(corners[wide], middles[wide], edge)
-        ends = halves(ends[wide], true[wide], edge)
+        edge = length[wide].argmax(axis=1)
+        middle = middles[wide][np.arange(len(edge)), edge]
+        corners, ends = halves(corners[wide], edge, middle), halves(ends[wide], edge, points_on(face, middle))
         source = np.tile(source[wide], 2)
-    return np.concatenate(finished), np.concatenate(sources), farthest
+    uvs, sources, errors = map(np.concatenate, zip(*finished, strict=True))
+    return uvs, sources, errors
 
 
 def depths(brep: bytes, points: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
+from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.triangles import closest_points, edge_middles
@@ -28,10 +28,7 @@ A crowned face with straight borders is four times as far from a triangle betwee
 """
 
 _FACTORS = np.array([1.0, 1.0, 2.0, 1.4, 1.4, SAMPLED])
-"""The same by kind of surface. On a cylinder, as on a circle, nothing is further than such a middle; on spheres and
-tori, of which a facet is a small part, it is next to quadratic. Along the edge of a cone from a circle to another one
-of k times its radius it is 2 (1 + k) / (1 + sqrt k)^2 times as far.
-"""
+"""How much farther from a face of each kind a triangle can be than at its edges' middles (`sag_factors`)."""
 
 _FINER = (1.0, 4.0, 16.0)
 """How much finer meshes are asked for, one after the other, where the one before overlooks some of a spline."""
@@ -118,8 +115,23 @@ def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
     return points, triangles.reshape(-1, 3), uv
 
 
+def sag_factors(kind: int, frame: Array, triangles: Array) -> Array:
+    """How much farther (m,) triangles (m, 3, 3) can be from their surface than at the middles of their edges.
+
+    On a cylinder, as on a circle, nothing is further than such a middle; on spheres and tori, of which a facet is a
+    small part, it is next to quadratic. Along the edge of a cone from a circle to another one of k times its radius it
+    is 2 (1 + k) / (1 + sqrt k)^2 times as far.
+    """
+    factors = np.full(len(triangles), _FACTORS[kind])
+    if kind == CONE:
+        radii = np.hypot(*np.moveaxis((triangles - frame[0]) @ frame[1:3].T, 2, 0))
+        k = radii.min(axis=1) / np.maximum(radii.max(axis=1), 1e-300)
+        factors = 2.0 * (1.0 + k) / (1.0 + np.sqrt(k)) ** 2
+    return factors
+
+
 def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntArray, uv: Array) -> Array:
-    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `_FACTORS`.
+    """How far (m,) mm each triangle can be from its surface: measured at the edges' middles, times `sag_factors`.
 
     Splines are looked at in more places, on the edges and between.
     """
@@ -133,7 +145,8 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
         middles = edge_middles(points[triangles])
         off, heights = (np.abs(height(kind, form.frame[k], form.size[k], x)) for x in (middles.reshape(-1, 3), points))
         corner = float(heights.max())
-    return np.asarray(_FACTORS[kind] * off.reshape(len(triangles), -1).max(axis=1) + corner)
+    factors = sag_factors(kind, form.frame[k], points[triangles])
+    return np.asarray(factors * off.reshape(len(triangles), -1).max(axis=1) + corner)
 
 
 def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Array) -> Array:

@@ -54,10 +54,10 @@ def edge_middles(corners: Array) -> Array:
     return np.asarray(0.5 * (corners + np.roll(corners, -1, axis=1)))
 
 
-def halves(corners: Array, middles: Array, edge: NDArray[np.int64]) -> Array:
-    """Triangles (2 m, 3, k): each of (m, 3, k) cut in two from the middle of an edge, whose number (m,) is given."""
+def halves(corners: Array, edge: NDArray[np.int64], middle: Array) -> Array:
+    """Triangles (2 m, 3, k): each of (m, 3, k) cut in two from a point (m, k) of its edge (m,)."""
     rows = np.arange(len(corners))
-    a, b, c, middle = corners[rows, edge], corners[rows, (edge + 1) % 3], corners[rows, edge - 1], middles[rows, edge]
+    a, b, c = corners[rows, edge], corners[rows, (edge + 1) % 3], corners[rows, edge - 1]
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 

@@ -123,6 +123,46 @@ def test_triangles_are_outside_only_where_no_point_of_them_is_inside():
     assert len(one.is_outside(triangles[:0])) == 0
 
 
+def crossings(surface, starts, moves):
+    """How often (n,) segments from points (n, 3) meet the triangles of a surface, by their equations alone."""
+    a, b, c = (surface.vertices[surface.faces[:, k]][None] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    along = (moves[:, None] * normal).sum(axis=2)
+    share = ((a - starts[:, None]) * normal).sum(axis=2) / np.where(along == 0.0, np.nan, along)
+    hit = starts[:, None] + share[:, :, None] * moves[:, None]
+    inside = [(np.cross(q - p, hit - p) * normal).sum(axis=2) >= 0.0 for p, q in ((a, b), (b, c), (c, a))]
+    return (np.all(inside, axis=0) & (share >= 0.0) & (share <= 1.0)).sum(axis=1)
+
+
+def test_every_point_of_a_triangle_that_crosses_a_surface_does_so():
+    """A wavy sheet with a hole, whose triangles are split at a seam, and a bracket without one of its triangles."""
+    rng, x = np.random.default_rng(9), np.linspace(0.0, 10.0, 21)
+    corners = np.array([(u, v, 0.6 * np.sin(u) * np.cos(0.5 * v)) for u in x for v in x])
+    cells = np.array([i * 21 + j for i in range(20) for j in range(20) if not (8 <= i < 11 and 8 <= j < 10)])
+    faces = np.concatenate(
+        [np.column_stack([cells, cells + 21, cells + 22]), np.column_stack([cells, cells + 22, cells + 1])]
+    )
+    sheet = Surface(np.concatenate([corners, corners]), faces + 441 * (faces.max(axis=1) > 300)[:, None])
+    sheets = sheet, Surface(BRACKET.vertices, BRACKET.faces[1:])
+    crossed = []
+    for surface in sheets:
+        moves = rng.normal(size=(3000, 3)) * 10.0 ** rng.uniform(-2.0, 0.7, (3000, 1))
+        on = (
+            rng.dirichlet(np.ones(3), (3000, 1))
+            @ surface.vertices[surface.faces[rng.integers(len(surface.faces), size=3000)]]
+        )
+        triangles = on - (rng.uniform(size=(3000, 1)) * moves)[:, None]
+        sizes = 10.0 ** np.sort(rng.uniform(-2.0, 0.3, (3000, 1, 1)), axis=0)[::-1]
+        triangles = triangles + rng.normal(size=(3000, 3, 3)) * sizes
+        rows = np.flatnonzero(surface.is_crossed(triangles, moves))[:250]
+        points = np.einsum("wc,mcx->mwx", rng.dirichlet(0.6 * np.ones(3), 25), triangles[rows]).reshape(-1, 3)
+        assert (crossings(surface, points, np.repeat(moves[rows], 25, axis=0)) % 2 == 1).all()
+        crossed.append(len(rows))
+    assert crossed[0] > 150
+    assert crossed[1] > 100
+    assert not sheet.is_crossed(np.empty((0, 3, 3)), np.empty((0, 3))).any()
+
+
 def test_where_contacts_may_be_missing_no_triangle_is_outside(monkeypatch):
     one, across = Surface(BRACKET.vertices, BRACKET.faces), np.array([[[-9.0, 3, 5], [60.0, 3, 5], [20.0, 3, 9]]])
     apart = across + np.array([0.0, 0.0, 40.0])

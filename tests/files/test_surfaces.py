@@ -85,7 +85,7 @@ def test_what_bends_up_as_much_as_down_is_no_plane():
     spline = occ.BRep_Tool.Surface_s(next(explore(as_splines(block((0, 0, 0), (4, 4, 4))), "FACE")))
     spline.IncreaseDegree(3, 3)
     plane = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(1e-7)
-    kind, *data = faces._form(occ.GeomAdaptor_Surface(plane))
+    kind, *data = faces.form_of(occ.GeomAdaptor_Surface(plane))
     assert faces._coincides(spline, kind, *data)
     normal = occ.gp_Vec(*data[0][3].tolist())
     for u, v, rise in ((2, 2, 1e-5), (3, 2, -1e-5), (2, 3, -1e-5), (3, 3, 1e-5)):  # nothing at the middle
