@@ -26,4 +26,4 @@ def as_manifold(vertices: Array, faces: NDArray[np.int64]) -> Any:
 def arrays_of(manifold: Any) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3) and faces (m, 3) of a solid of manifold3d."""
     mesh = manifold.to_mesh64()
-    return np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int64)
+    return np.array(mesh.vert_properties, dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64)

@@ -41,6 +41,12 @@ def test_arcs_apart_on_one_axis_stay_apart():
         assert values["length_error"] < 1e-9
 
 
+@pytest.mark.parametrize("aside", [0.8, 0.01])
+def test_two_bores_that_cut_each_other_are_two(aside):
+    _, found, _ = features(cut(box((-20, -20, 0), (20, 20, 6)), rod(5, -1, 7), rod(5, -1, 7, aside)))
+    assert [values["radius"] for _, values in found] == [5.0, 5.0]
+
+
 def test_a_file_gives_holes_grooves_and_cylinders_with_their_places(tmp_path):
     plate = cut(box((-20, -10, 0), (20, 10, 6)), rod(3, -1, 7, 5, 2), rod(2, 3, 7, -8), rod(4, -1, 7, 20))
     pin = rod(2.5, 0, 30).Located(location(shift(60)))
