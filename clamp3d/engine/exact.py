@@ -30,10 +30,8 @@ _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
-_CUTS, _MOST_CUTS = 450.0e3, 200_000
-"""Triangles that are added to a common part's border at most to bound its depth: as many over the chords' share, so
-that coarse samples are not cut for long, and never more than the second, which take two seconds.
-"""
+_CUTS = 200_000
+"""Triangles that are added to each side of a common part's border at most to bound its depth: they take seconds."""
 _FAINT = 1e-4
 """Overlap (mm) that Open CASCADE may leave out, where the edges of a file have tolerances of that size."""
 _NARROW, _HIDING = 9e-3, 0.01
@@ -145,7 +143,7 @@ def exact_overlap(
     def is_end(at_most: float, least: float) -> bool:
         return end(bounded(at_most), bounded(max(least, -reached.upper)))
 
-    at_most = farthest(sides, is_end, min(round(_CUTS / share), _MOST_CUTS))
+    at_most = farthest(sides, is_end, _CUTS)
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=unknown.method)
     return bounded(at_most)
