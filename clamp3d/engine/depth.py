@@ -41,8 +41,8 @@ LONG = 3.0
 """Ratio of a way out to the interference from which on that is bounded by itself: how far a pin is to be moved out of
 its hole says nothing of how much it is too thick.
 """
-_SHARP = 1.05
-"""Ratio of the bound of an interference to the depth of a point at which it is sharpened no further."""
+_SHARP, _SHARPER = 1.05, 1.005
+"""Ratio of the bound of an interference to the closest that it can be at which it is sharpened no further."""
 _STEADY = 10.0
 """Ratio of a way out to what meshes hide from which on finer ones shorten it by no more than a fifth."""
 _TIGHT = 1.01
@@ -243,8 +243,8 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, 
     own = Distance()
     if a.exact is not None and b.exact is not None:
 
-        def end(bounds: Distance, _: Distance) -> bool:
-            return not thorough and _is_sharp(-bounds.lower, -bounds.upper)
+        def end(bounds: Distance, closest: Distance) -> bool:
+            return bounds.lower >= (_SHARPER if thorough else _SHARP) * closest.lower
 
         own = exact_overlap(a, b, meshes.T, SHARES[1], end=end, attested=depth)
         if np.isfinite(own.lower):

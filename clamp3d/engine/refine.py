@@ -28,6 +28,9 @@ ACCURACY = 1e-7
 _COINCIDENT = 1e-4
 """Overlap (mm) beyond which there is a common part to ask for; up to it faces coincide, which meshes prove."""
 
+_OPEN = 1.02
+"""Ratio of a bound that decides nothing to the closest that it can be at which it is sharpened no further."""
+
 Enough = Callable[[Distance], bool]
 
 
@@ -124,7 +127,9 @@ def _common_parts(a: Model, b: Model, T: Array, enough: Enough, attested: float,
     from clamp3d.engine.exact import SHARES, exact_overlap
 
     def end(bounds: Distance, closest: Distance) -> bool:
-        return enough(bounds) or (share != SHARES[-1] and not enough(closest))  # finer samples may tell
+        if enough(closest):
+            return enough(bounds)
+        return share != SHARES[-1] or bounds.lower >= _OPEN * closest.lower  # finer samples may decide it
 
     for share in SHARES:
         overlap = exact_overlap(a, b, T, share, end=end, quick=quick and share == SHARES[0], attested=attested)
