@@ -8,6 +8,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.broad import Boxes, near_between
+from clamp3d.engine.depth import depth_of_pieces
 from clamp3d.engine.model import Model, Progress, box_corners
 from clamp3d.engine.moving_pair import MovingPair
 from clamp3d.engine.reasons import failure, undecided
@@ -65,6 +66,10 @@ def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, 
     except Exception as error:  # one pair that fails is a finding, not the end of all others
         return PairResult(a, b, Verdict.FAILED, Distance(), motion.name, reason=failure(error))
     verdict = thresholds.verdict(least, allowance)
+    if verdict is not Verdict.CLASH and least.upper < -RESOLUTION:  # known, the depth decides, as at rest
+        depth = depth_of_pieces(pair.a, pair.b, pair.pose(t))
+        if depth is not None and thresholds.verdict(depth, allowance) is Verdict.CLASH:
+            verdict, least = Verdict.CLASH, replace(depth, lower=-np.inf)
     distance = with_normal(least)
     if verdict in BAD:
         distance = replace(distance.of_overlap(), interference=None)  # at another time they may be deeper

@@ -69,7 +69,7 @@ def distance(
     (2.0, [0.0, 0.0, 1.0])
     """
     T = np.eye(4) if T_a_b is None else check_pose(T_a_b, "T_a_b")
-    x, y = _bounded(a, b, T[None])
+    x, y = as_bounded(a, b, T[None])
     cache = _checked(cache, model)
     return _measured(cache.model(x), cache.model(y), T, positive("accuracy", accuracy), model)
 
@@ -110,7 +110,7 @@ def distances(
     """
     T = check_pose_array(T_a_b, "T_a_b")
     cache = _checked(cache, model)
-    shapes = _bounded(a, b, T)
+    shapes = as_bounded(a, b, T)
     x, y = (cache.model(shape) for shape in shapes)
     batch = bounds_at_poses(x, y, T)
     is_exact = (batch.lower >= 0.0) & (batch.upper - batch.lower <= ACCURACY)
@@ -126,7 +126,7 @@ def distances(
     return Distances(**fields, method=tuple(methods))
 
 
-def _bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:
+def as_bounded(a: AnyShape, b: AnyShape, T: Array) -> tuple[Shape, Shape]:
     """Both as shapes of a scene: a bare groove in a block whose other faces are too far away to matter at ``T``."""
     if isinstance(a, SweptArc) == isinstance(b, SweptArc):
         return as_shape(a), as_shape(b)

@@ -83,6 +83,7 @@ class Model:
         self.shape = shape
         self.counters = counters
         self._meshes: dict[tuple[float, bool], Surface | None] = {}
+        self._failures: dict[tuple[float, bool], Clamp3dError] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return model_of, (self.shape, Counters())
@@ -160,8 +161,14 @@ class Model:
         return self._mesh(max(chord, self.chords[-1]), inside=self.bracketed)
 
     def _mesh(self, chord: float, *, inside: bool) -> Surface | None:
+        if (chord, inside) in self._failures:  # it took its time
+            raise self._failures[chord, inside]
         if (chord, inside) not in self._meshes:
-            mesh = self._meshes[chord, inside] = self._surface(chord, inside)
+            try:
+                mesh = self._meshes[chord, inside] = self._surface(chord, inside)
+            except Clamp3dError as error:
+                self._failures[chord, inside] = error
+                raise
             self.counters.built["meshes"] += mesh is not None
             self.counters.built["triangles"] += 0 if mesh is None else len(mesh.faces)
         return self._meshes[chord, inside]

@@ -20,8 +20,6 @@ Spent = Callable[[], float]
 
 ACCURACY = 1e-6
 """Default accuracy of a search, mm."""
-SHARPENING = 0.04
-"""Share of its budget after which bounds that are sharp enough end a search."""
 
 
 class Least(NamedTuple):
@@ -83,7 +81,7 @@ def least(
         The share of its budget that the search has spent; the bounds are further apart where that is not enough, as it
         is where those of ``distance`` are.
     is_enough : callable, optional
-        Whether bounds (mm) of the answer are sharp enough, so that `SHARPENING` of the budget ends the search.
+        Whether bounds (mm) of the answer are sharp enough to end the search.
 
     Examples
     --------
@@ -96,7 +94,7 @@ def least(
     heap = [_bounded(_Stretch(-math.inf, 0.0, 1.0, start[0], stop[0]), speed, bound, upper - accuracy)]
     lower = math.inf  # of all stretches that no time parts
     while heap and heap[0].lower < upper - accuracy and spent() < 1.0:
-        if spent() >= SHARPENING and is_enough(min(heap[0].lower, lower), upper):
+        if is_enough(min(heap[0].lower, lower), upper):
             break
         stretch = heapq.heappop(heap)
         middle = _meeting(stretch, speed)

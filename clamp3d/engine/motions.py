@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.distance import as_bounded
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.moving_groove import MovingInGroove
 from clamp3d.engine.moving_pair import MovingPair
@@ -18,8 +19,11 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.motion import Motion, scene_pose
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc, place
-from clamp3d.geometry.shapes import AnyShape, as_shape
+from clamp3d.geometry.shapes import AnyShape
 from clamp3d.kernel.distance import SignedDistance
+
+_STATIONS = 33
+"""Times at which it is looked how far a body goes from a bare groove, whose other faces are eight times as far away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +116,7 @@ def first_contact(
     least, t = pair.least_distance()
     if first is not None and least.upper <= margin + RESOLUTION:  # the search ended early, and they meet later
         return _answer(pair, True, first, here)
-    return _answer(pair, False if least.lower > margin else None, t, least)
+    return _answer(pair, False if first is None or least.lower > margin else None, t, least)
 
 
 def min_clearance(
@@ -146,8 +150,9 @@ def _moving_pair(
     screw = motion.resolved(T)
     if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
         return MovingInGroove(a, b, screw, T, resolution)
-    cache = ModelCache()
-    return MovingPair(cache.model(as_shape(b)), cache.model(as_shape(a)), screw, T, np.eye(4))
+    cache, way = ModelCache(), np.array([screw.at(t, T) for t in np.linspace(0.0, 1.0, _STATIONS)])
+    still, moving = (cache.model(shape) for shape in as_bounded(a, b, way))
+    return MovingPair(moving, still, screw, T, np.eye(4))
 
 
 def _answer(pair: MovingPair, touches: bool | None, t: float, distance: Distance) -> MotionDistance:

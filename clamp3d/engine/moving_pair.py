@@ -9,8 +9,8 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.model import Model, box_corners
 from clamp3d.engine.motion_search import Spent, first_time, least
-from clamp3d.engine.refine import Enough, from_boxes, refine, with_normal
-from clamp3d.engine.swept import swept_lower
+from clamp3d.engine.refine import Enough, accuracy_for, from_boxes, refine, with_normal
+from clamp3d.engine.swept import HALF_TURN, swept_lower
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, inverse, to_target
@@ -18,7 +18,9 @@ from clamp3d.geometry.pose import Array, inverse, to_target
 ACCURACY = 1e-6
 """A first contact and a least distance are searched to within this (mm), or to what the models give."""
 CHECKED = 1e-4
-"""The same for the least distance of a scene's motion, which has to give a verdict and a number to print."""
+"""The same for the least distance of a scene's motion whose verdict is certain: it is a number to print."""
+SHARPENING = 0.04
+"""Share of its budget after which any bounds of a verdict that is certain end a search."""
 BUDGET = 5000
 """Work of one search, in evaluations by closed forms or meshes, which take about a millisecond."""
 _HEAVY = 50
@@ -77,8 +79,10 @@ class MovingPair:
         if self._uninformative >= _UNINFORMATIVE or not (self.a.closed and self.b.closed):
             return -np.inf
         middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
-        poses = (self.pose(start), self.pose(middle), self.pose(stop))
         angle = self.motion.angle * half
+        if abs(angle) >= HALF_TURN:  # shorter stretches may say something
+            return -np.inf
+        poses = (self.pose(start), self.pose(middle), self.pose(stop))
         lower = swept_lower(self.a, self.b, *poses, angle=angle, screw=self.motion.is_screw)
         self._uninformative = 0 if lower > 0.0 else self._uninformative + 1
         return lower
@@ -87,12 +91,11 @@ class MovingPair:
         self, thresholds: Thresholds | None = None, allowance: float | None = None
     ) -> tuple[Distance, float]:
         """Least distance on the way, and its time; with ``thresholds`` sharp where that is cheap or they need it."""
-        accuracy = self.accuracy if thresholds is None else CHECKED
         best, t_best, overlaps = Distance(), 0.0, 0
 
         def distance(t: float, way: float) -> tuple[float, float]:
             nonlocal best, t_best, overlaps
-            here = self._sharp(t, best.upper + way, accuracy, thresholds)
+            here = self._sharp(t, best.upper + way, thresholds)
             if here.upper < best.upper:
                 best, t_best = here, t
                 if thresholds is not None and thresholds.verdict(here, allowance) is Verdict.CLASH:
@@ -103,29 +106,37 @@ class MovingPair:
             return here.lower, here.upper
 
         def is_certain(lower: float, upper: float) -> bool:
-            verdict = thresholds and thresholds.verdict(Distance(lower, upper), allowance)
-            return verdict not in (None, Verdict.UNCERTAIN)
+            if thresholds is None or thresholds.verdict(Distance(lower, upper), allowance) is Verdict.UNCERTAIN:
+                return False
+            return upper - lower <= CHECKED or spent() >= SHARPENING
 
         spent = self.budget()
         try:
             bounds = least(
-                distance, self.speed, bound=self.between, accuracy=accuracy, spent=spent, is_enough=is_certain
+                distance, self.speed, bound=self.between, accuracy=self.accuracy, spent=spent, is_enough=is_certain
             )
         except _CertainError:
             return replace(best, lower=-np.inf), t_best
         return replace(best, lower=min(bounds.lower, best.upper)), t_best
 
-    def _sharp(self, t: float, most: float, accuracy: float, thresholds: Thresholds | None) -> Distance:
+    def _sharp(self, t: float, most: float, thresholds: Thresholds | None) -> Distance:
         """The distance at ``t``, refined as far as it can matter: known, deep enough, or more than ``most`` mm."""
 
         def enough(distance: Distance) -> bool:
-            if distance.upper - distance.lower <= 0.5 * accuracy or distance.lower >= most:
+            width = distance.upper - distance.lower
+            if width <= self._width(self.accuracy) or distance.lower >= most:
                 return True
             if thresholds is None:  # of an overlap nothing is searched that the distance at one time does not tell
                 return distance.upper < -ACCURACY
-            return thresholds.verdict(distance) in (Verdict.CLASH, Verdict.CONTACT)
+            verdict = thresholds.verdict(distance)
+            is_known = width <= self._width(CHECKED) and verdict is not Verdict.UNCERTAIN
+            return is_known or verdict in (Verdict.CLASH, Verdict.CONTACT)
 
         return self.at(t, enough)
+
+    def _width(self, accuracy: float) -> float:
+        """Width (mm) of a distance that is known for a search to within ``accuracy`` mm."""
+        return accuracy_for(self.a, self.b, 0.5 * accuracy)
 
     def first_time(self, level: float) -> float | None:
         """Everything before this time is proven to be further apart than ``level`` mm; None if all of the way is."""
@@ -133,7 +144,7 @@ class MovingPair:
         def distance(t: float, way: float) -> tuple[float, float]:
             def enough(distance: Distance) -> bool:
                 width = distance.upper - distance.lower
-                return width <= 0.5 * self.accuracy or distance.lower > level + way or distance.upper <= level
+                return width <= self._width(self.accuracy) or distance.lower > level + way or distance.upper <= level
 
             here = self.at(t, enough)
             return here.lower, here.upper

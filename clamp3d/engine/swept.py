@@ -20,6 +20,9 @@ from clamp3d.engine.hull import Hull, hull
 from clamp3d.engine.model import Model
 from clamp3d.geometry.pose import Array, inverse, to_target
 
+HALF_TURN = 0.5 * math.pi
+"""Turn (rad) of half a stretch from which on nothing bounds what is swept on all of it."""
+
 
 def swept_lower(
     a: Model, b: Model, before: Array, middle: Array, after: Array, *, angle: float, screw: bool = True
@@ -27,10 +30,8 @@ def swept_lower(
     """Distance (mm) that ``b`` certainly keeps from ``a`` while it goes from ``before`` over ``middle`` to ``after``.
 
     All three (4, 4) in a's frame, evenly spaced on a way that turns by ``angle`` (rad) between two of them: one screw,
-    or a turn of a that is carried across its axis. Minus infinity for half a turn or more.
+    or a turn of a that is carried across its axis. ``angle`` must be less than `HALF_TURN`.
     """
-    if abs(angle) >= 0.5 * np.pi:
-        return -np.inf
     there: tuple[Array, ...] = (before, middle, after)
     back = tuple(inverse(T) for T in there)
     if not screw:  # seen from a, the points of b are on spirals, which no arc bounds
@@ -39,7 +40,10 @@ def swept_lower(
     for x, y in itertools.product(a.enclosing, b.enclosing):
         bounds = [*_bounds(x, y, there, angle)]
         if screw:
-            bounds += _bounds(replace(y, outers=()), x, back, angle)
+            # Swept, a ball is a larger ball: the hull of a polyhedron that comes to it holds less.
+            is_angular = any(isinstance(piece, Hull) for piece in x.outers)
+            rounds = tuple(piece for piece in y.outers if is_angular and not isinstance(piece, Hull))
+            bounds += _bounds(replace(y, outers=rounds), x, back, angle)
         best = min(best, max(bounds, default=-np.inf) - x.error - y.error)
     return float(best)
 

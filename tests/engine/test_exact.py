@@ -696,3 +696,13 @@ def test_a_search_that_needs_common_parts_ends_after_fewer_times(monkeypatch):
     least, _ = pair.least_distance(Thresholds())
     assert pair.evaluations == 10
     assert least.lower < -0.01 < -1e-6 <= least.upper <= 1e-6  # nothing is known of the times between
+
+
+def test_a_ball_that_falls_through_a_ring_touches_it_when_its_centre_tells():
+    """Between steps Open CASCADE's tolerance is all that can be known, and fine meshes of the ring take too long."""
+    ring_and_ball = [BrepSolid.of(first_solid(solid), "solid") for solid in (ring(20.0, 8.0), ball(0.5))]
+    scene = Scene().add("ring", ring_and_ball[0]).add("ball", ring_and_ball[1], shift(20.0, 0.0, 20.0))
+    (row,) = check(scene.with_motion(Motion.translate((0.0, 0.0, -40.0), parts="ball"))).motions
+    assert row.verdict.value == "clash"
+    latest = (20.0 - 8.0 - 0.5 - 0.010001) / 40.0
+    assert latest - 1e-6 < row.contact_at <= latest

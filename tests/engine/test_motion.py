@@ -11,7 +11,7 @@ import trimesh
 
 from clamp3d import InputError, Motion, Scene, Verdict, check, first_contact, shapes
 from clamp3d.engine import moving_pair
-from clamp3d.kernel import rotation, translation
+from clamp3d.kernel import Cylinder, SweptArc, rotation, translation
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
 from clamp3d.shapes import make_mesh
@@ -142,3 +142,60 @@ def test_a_first_contact_is_not_told_later_than_it_is():
     assert re.search(r"  b and a clash: overlap at least \d+(\.\d+)? mm; .*first contact at t = 0\.1234,", told)
     row = next(line for line in told.splitlines() if line.startswith("  translation"))
     assert " 0.1234 " in row
+
+
+def test_what_clashes_at_rest_clashes_on_its_way_however_thin_it_is():
+    """A strip across a foil: no point of either is 0.01 mm deep in the other, but 0.0175 mm part them."""
+    before = Scene().add("foil", shapes.box((20.0, 20.0, 0.005)))
+    before = before.add("strip", shapes.box((20.0, 0.005, 0.03)), translation(0, 0, 5))
+    within = before.moved({"strip": np.eye(4)})
+    (row,) = check(within).pairs
+    assert row.verdict.value == "clash"
+    for scene, way in ((within, 0.0), (within, 1e-4), (before, -10.0)):
+        (row,) = check(scene.with_motion(Motion.translate((0, 0, way), parts="strip"))).motions
+        assert row.verdict.value == "clash"
+
+
+@pytest.mark.parametrize("who", ["plate", "ball"])
+def test_a_ball_that_a_plate_is_moved_to_is_met_as_late_as_the_plate_by_the_ball(who):
+    way = np.array([100.0, 0.0, -0.015]) * (1.0 if who == "ball" else -1.0)
+    scene = Scene().add("plate", shapes.box((200, 20, 10))).add("ball", shapes.sphere(4.0), translation(-50, 0, 9.02))
+    (row,) = check(scene.with_motion(Motion.translate(way, parts=who))).motions
+    assert row.verdict.value == "contact"
+    assert row.distance.lower - 1e-9 <= 0.005 <= row.distance.upper + 1e-9
+    assert row.contact_at == pytest.approx((0.02 - 0.010001) / 0.015, abs=1e-4)
+
+
+def test_a_pin_that_turns_often_about_its_own_axis_keeps_its_play():
+    scene = (
+        Scene().add("hole", shapes.cylinder(10, 4, bore=5)).add("pin", shapes.cylinder(4.985, 4), translation(0, 0, 10))
+    )
+    for turns in (3, 10, 40):
+        (row,) = check(scene.with_motion(Motion.screw((0, 0, 1), 2 * np.pi * turns, travel=-10, parts="pin"))).motions
+        assert row.verdict.value == "clear"
+        assert row.distance.lower <= 0.015 + 1e-9 <= row.distance.upper + 2e-9
+
+
+@pytest.mark.parametrize(("gap", "verdict"), [(0.01005, "clear"), (0.00995, "contact")])
+def test_a_least_distance_near_the_threshold_is_searched_until_the_verdict_is_certain(gap, verdict):
+    scene = Scene().add("a", shapes.sphere(5.0)).add("b", shapes.sphere(3.0), translation(-20.0, 8.0 + gap, 0.0))
+    (row,) = check(scene.with_motion(Motion.translate((41.3, 0.0, 0.0), parts="b"))).motions
+    assert row.verdict.value == verdict
+    assert row.distance.lower <= gap + 1e-9 <= row.distance.upper + 2e-9
+
+
+def test_a_depth_that_is_never_reached_is_known_not_to_be():
+    groove, wire = SweptArc(7.0, 1.0, 50.0), Cylinder(6.5, 80.0)
+    hit = first_contact(groove, wire, Motion.screw((0, 0, 1), 0.3), translation(0, -0.52, 0), margin=-0.05)
+    assert hit.touches is False
+
+
+def test_a_bare_groove_meets_any_shape_in_either_order():
+    groove, wire, away = SweptArc(7.0, 1.0, 50.0), Cylinder(6.5, 80.0), translation(0, 20.0, 0)
+    one = first_contact(groove, wire, Motion.translate((0, -40.0, 0)), away)
+    other = first_contact(wire, groove, Motion.translate((0, 40.0, 0)), translation(0, -20.0, 0))
+    assert (one.touches, other.touches) == (True, True)
+    assert other.t == pytest.approx(one.t, abs=1e-7)
+    block = first_contact(groove, shapes.box((4.0, 4.0, 4.0)), Motion.translate((0, -40.0, 0)), away)
+    latest = (20.0 + np.sqrt(49.0 - 4.0) - 2.0) / 40.0
+    assert latest - 1e-4 < block.t <= latest  # by meshes of the groove
