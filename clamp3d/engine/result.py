@@ -44,7 +44,8 @@ class PairResult:
     motion : str or None
         Name of the motion; None at rest.
     t, contact_at : float or None
-        In a motion: normalised time of the least distance, and of the first contact.
+        In a motion: normalised time of the least distance, and of the first contact. All before that is certainly
+        free; it may be early where the parts stay within the search's accuracy of contact, or its budget ended.
     reason : str
         Why a verdict is uncertain and what would decide it, or why the pair failed; else empty.
     locator : Locator or None
