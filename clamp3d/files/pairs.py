@@ -28,7 +28,7 @@ from clamp3d.files.open_cascade import (
 from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of
 from clamp3d.geometry.mesh import Array, IntArray
 from clamp3d.geometry.pose import to_target
-from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
+from clamp3d.geometry.triangles import distances_from_segments, edge_middles, halves, normals_and_areas
 
 _SLENDER = 400.0
 """Ratio of a common part's size to its thickness beyond which its chords go by the size: else they take seconds."""
@@ -279,11 +279,12 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
     finished = [(corners[:0], source[:0], np.empty(0))]
     count = len(triangles)
     while len(corners):
-        middles, chords = edge_middles(corners), edge_middles(ends)
+        middles = edge_middles(corners)
         if kind == OTHER:
-            off = np.linalg.norm(points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3) - chords, axis=2)
+            true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
+            off = distances_from_segments(true, ends, np.roll(ends, -1, axis=1))
         else:
-            off = np.abs(height(kind, frame, size, chords.reshape(-1, 3))).reshape(-1, 3)
+            off = np.abs(height(kind, frame, size, edge_middles(ends).reshape(-1, 3))).reshape(-1, 3)
         wide, length = off.max(axis=1) > sag, off
         if count < _SAMPLES and not wide.any():
             wide[:], length = True, np.linalg.norm(np.roll(ends, -1, axis=1) - ends, axis=2)

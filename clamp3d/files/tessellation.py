@@ -12,7 +12,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import Array, IntArray
-from clamp3d.geometry.triangles import closest_points, edge_middles
+from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
 
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
@@ -210,9 +210,8 @@ def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
         factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
         times = at[:-1, None] + np.diff(at)[:, None] * shares
         true = np.array([curve.Value(t).Coord() for t in times.reshape(-1).tolist()]).reshape(*times.shape, 3)
-        ends = points[nodes]
-        chords = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * shares[:, None]
-        sags = factor * np.linalg.norm(true - chords, axis=2).max(axis=1)
+        ends = points[nodes][:, None]
+        sags = factor * distances_from_segments(true, ends[:-1], ends[1:]).max(axis=1)
         sag_of.update(zip(_edge_keys(nodes[:-1], nodes[1:]).tolist(), sags.tolist(), strict=True))
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))

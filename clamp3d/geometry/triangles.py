@@ -45,6 +45,17 @@ def closest_points(triangles: Array, points: Array) -> Array:
     return np.asarray(nearest)
 
 
+def distances_from_segments(points: Array, starts: Array, ends: Array) -> Array:
+    """How far (...,) points (..., 3) are from the segments between ``starts`` and ``ends`` (..., 3).
+
+    >>> distances_from_segments(np.array([3.0, 4.0, 0.0]), np.zeros(3), np.array([1.0, 0.0, 0.0])).round(9).tolist()
+    4.472135955
+    """
+    ways = ends - starts
+    along = ((points - starts) * ways).sum(axis=-1) / np.maximum((ways * ways).sum(axis=-1), 1e-300)
+    return np.asarray(np.linalg.norm(points - starts - np.clip(along, 0.0, 1.0)[..., None] * ways, axis=-1))
+
+
 def edge_middles(corners: Array) -> Array:
     """The middles (m, 3, k) of the edges of triangles (m, 3, k), each of that which begins at a corner.
 

@@ -13,7 +13,7 @@ from clamp3d import Verdict, check, load
 from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
-from clamp3d.files.tessellation import _deviation, tessellate, triangles_of
+from clamp3d.files.tessellation import _deviation, border_sag, tessellate, triangles_of
 from tests.cad import array_of, ball, block, cone, cut, first_solid, location, moved, random_pose, ring, rod, turn
 from tests.files.assemblies import write_step
 from tests.public.placed_pairs import arch
@@ -233,3 +233,18 @@ def test_a_bump_that_stands_in_another_part_clashes(tmp_path):
     (row,) = check(load(write_step(parts, tmp_path / "bump.step")), depths=False).pairs
     assert row.verdict is Verdict.CLASH
     assert -8.0 / 9.0 < row.distance.upper < -0.6
+
+
+@pytest.mark.parametrize(("bend", "sag"), [(0.0, 0.0), (0.2, 0.1)])
+def test_a_border_whose_parameters_are_uneven_is_off_by_what_it_bends_alone(bend, sag):
+    """A face between a line and a parabola, which half of its parameters take to three tenths of its chord."""
+    poles = array_of("gp_Pnt", [occ.gp_Pnt(x, y, 0.0) for x, y in ((0.0, 0.0), (1.0, -bend), (10.0, 0.0))])
+    corners = [occ.gp_Pnt(x, y, 0.0) for x, y in ((10.0, 0.0), (10.0, 5.0), (0.0, 5.0), (0.0, 0.0))]
+    wire = occ.BRepBuilderAPI_MakeWire(occ.BRepBuilderAPI_MakeEdge(occ.Geom_BezierCurve(poles)).Edge())
+    for a, b in itertools.pairwise(corners):
+        wire.Add(occ.BRepBuilderAPI_MakeEdge(a, b).Edge())
+    face = occ.BRepBuilderAPI_MakeFace(wire.Wire(), True).Face()
+    occ.BRepMesh_IncrementalMesh(face, 10.0)
+    points, triangles, _ = triangles_of(face, 0)
+    found = border_sag(face, points, triangles).max()
+    assert found == pytest.approx(2.0 * sag, rel=0.1, abs=1e-12)
