@@ -162,7 +162,7 @@ class Model:
 
     def _mesh(self, chord: float, *, inside: bool) -> Surface | None:
         if (chord, inside) in self._failures:  # it took its time
-            raise self._failures[chord, inside]
+            raise self._failures[chord, inside].with_traceback(None)
         if (chord, inside) not in self._meshes:
             try:
                 mesh = self._meshes[chord, inside] = self._surface(chord, inside)

@@ -150,7 +150,8 @@ def _moving_pair(
     screw = motion.resolved(T)
     if isinstance(a, SweptArc) and isinstance(b, (Cylinder, Capsule)):
         return MovingInGroove(a, b, screw, T, resolution)
-    cache, way = ModelCache(), np.array([screw.at(t, T) for t in np.linspace(0.0, 1.0, _STATIONS)])
+    cache, is_bare = ModelCache(), isinstance(a, SweptArc) or isinstance(b, SweptArc)
+    way = np.array([screw.at(t, T) for t in np.linspace(0.0, 1.0, _STATIONS if is_bare else 1)])
     still, moving = (cache.model(shape) for shape in as_bounded(a, b, way))
     return MovingPair(moving, still, screw, T, np.eye(4))
 

@@ -46,6 +46,7 @@ class MovingPair:
         self.speed = motion.speed(to_target(start, box_corners(moving.bounds)))
         self.evaluations = 0
         self.work = 0
+        self._known = accuracy_for(moving, still, 0.0)
         self._uninformative = 0
 
     def pose(self, t: float) -> Array:
@@ -136,7 +137,7 @@ class MovingPair:
 
     def _width(self, accuracy: float) -> float:
         """Width (mm) of a distance that is known for a search to within ``accuracy`` mm."""
-        return accuracy_for(self.a, self.b, 0.5 * accuracy)
+        return max(self._known, 0.5 * accuracy)
 
     def first_time(self, level: float) -> float | None:
         """Everything before this time is proven to be further apart than ``level`` mm; None if all of the way is."""

@@ -280,8 +280,8 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
     count = len(triangles)
     while len(corners):
         middles = edge_middles(corners)
+        true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
         if kind == OTHER:
-            true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)
             off = distances_from_segments(true, ends, np.roll(ends, -1, axis=1))
         else:
             off = np.abs(height(kind, frame, size, edge_middles(ends).reshape(-1, 3))).reshape(-1, 3)
@@ -293,9 +293,8 @@ def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: floa
         most = sag_factors(kind, frame, ends[~wide]) * off[~wide].max(axis=1)
         finished.append((corners[~wide], source[~wide], most))
         count += int(wide.sum())
-        edge = length[wide].argmax(axis=1)
-        middle = middles[wide][np.arange(len(edge)), edge]
-        corners, ends = halves(corners[wide], edge, middle), halves(ends[wide], edge, points_on(face, middle))
+        rows, edge = np.flatnonzero(wide), length[wide].argmax(axis=1)
+        corners, ends = halves(corners[wide], edge, middles[rows, edge]), halves(ends[wide], edge, true[rows, edge])
         source = np.tile(source[wide], 2)
     uvs, sources, errors = map(np.concatenate, zip(*finished, strict=True))
     return uvs, sources, errors

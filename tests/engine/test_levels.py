@@ -107,6 +107,25 @@ def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound(c
         assert truth + off.min() - 1e-9 <= sharp <= 1.02 * truth + 0.02
 
 
+def test_no_more_triangles_are_added_than_there_are_cuts(monkeypatch):
+    bracket, sizes, cut_further = Surface(BRACKET.vertices, BRACKET.faces), [1], Pieces.cut
+
+    def counted(*given):
+        pieces = cut_further(*given)
+        sizes.append(len(pieces.triangles))
+        return pieces
+
+    monkeypatch.setattr(Pieces, "cut", counted)
+    triangle = np.array([[[1.0, 1.0, 1.0], [4.0, 29.0, 3.0], [2.0, 9.0, 19.0]]])
+    pieces = Pieces.of(Sheet(bracket, np.zeros(len(bracket.faces))), triangle, np.zeros(1))
+    bounds = []
+    for cuts in (60, 600):
+        sizes[:] = [1]
+        bounds.append(farthest([pieces], lambda *_: False, cuts))
+        assert 0.3 * cuts < sizes[-1] - 1 <= cuts
+    assert bounds[0] > bounds[1]
+
+
 def test_triangles_are_outside_only_where_no_point_of_them_is_inside():
     rng, one = np.random.default_rng(6), Surface(BRACKET.vertices, BRACKET.faces)
     triangles = rng.uniform(-8.0, 45.0, (400, 1, 3)) + rng.uniform(-6.0, 6.0, (400, 3, 3))
