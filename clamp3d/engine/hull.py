@@ -124,7 +124,7 @@ def prism(corners: Array, start: float, end: float, frame: Array) -> Hull:
 def _planes(normals: Array, points: Array) -> Array:
     """Planes (m, 4) square to unit normals (m, 3), up to the highest of the points (n, 3): none is cut off."""
     step = max(1, _MEMORY // len(points))
-    top = [(points @ normals[k : k + step].T).max(axis=0) for k in range(0, len(normals), step)]
+    top = [(normals[k : k + step] @ points.T).max(axis=1) for k in range(0, len(normals), step)]
     return np.column_stack([normals, -np.concatenate(top)])
 
 

@@ -107,9 +107,9 @@ def first_contact(
     pair = _moving_pair(a, b, motion, T_a_b, resolution)
     if margin < 0.0 and not isinstance(pair, MovingInGroove):
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
-    first = pair.first_time(margin)
+    found = pair.first_time(margin)
+    first = None if found is None else pair.reached(found.t, margin)
     if first is not None:
-        first = pair.reached(first, margin)
         here = pair.at(first, measured)
         if here.upper <= margin + RESOLUTION:
             return _answer(pair, True, first, here)

@@ -30,6 +30,7 @@ class MovingInGroove(MovingPair):
     ) -> None:
         self.groove, self.cylinder, self.motion, self.start = groove, cylinder, motion, start
         self.evaluations = self.work = 0
+        self._known = 0.0
         offsets = float(np.abs([start[:3, 3], motion.travel, motion.angle * motion.point]).max())
         rounding = _ROUNDING * max(offsets, cylinder.length, groove.length) * (1.0 + abs(motion.angle))
         self.accuracy = max(ACCURACY if resolution is None else positive("resolution", resolution), rounding)

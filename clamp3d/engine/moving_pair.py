@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,16 @@ _HEAVY = 50
 """How many of those one by Open CASCADE counts for, or one that needs the common part of two meshes."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
+
+
+class First(NamedTuple):
+    """A first contact: there is none before ``t``, and one at ``by`` at the latest; inf if no time was seen with one.
+
+    They are as good as one unless the budget ended, or the bodies stay within the accuracy of contact.
+    """
+
+    t: float
+    by: float
 
 
 class _CertainError(Exception):
@@ -139,15 +150,21 @@ class MovingPair:
         """Width (mm) of a distance that is known for a search to within ``accuracy`` mm."""
         return max(self._known, 0.5 * accuracy)
 
-    def first_time(self, level: float) -> float | None:
-        """Everything before this time is proven to be further apart than ``level`` mm; None if all of the way is."""
+    def first_time(self, level: float) -> First | None:
+        """When they first come within ``level`` mm; None if all of the way is proven to be further apart."""
+        by, touching = np.inf, level + self.accuracy + self._width(self.accuracy)
 
         def distance(t: float, way: float) -> tuple[float, float]:
+            nonlocal by
+
             def enough(distance: Distance) -> bool:
                 width = distance.upper - distance.lower
                 return width <= self._width(self.accuracy) or distance.lower > level + way or distance.upper <= level
 
             here = self.at(t, enough)
+            by = min(by, t) if here.upper <= touching else by
             return here.lower, here.upper
 
-        return first_time(distance, self.speed, level, bound=self.between, accuracy=self.accuracy, spent=self.budget())
+        bound, spent = self.between, self.budget()
+        t = first_time(distance, self.speed, level, bound=bound, accuracy=self.accuracy, spent=spent)
+        return None if t is None else First(t, by)

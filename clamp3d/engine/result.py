@@ -43,9 +43,10 @@ class PairResult:
         only.
     motion : str or None
         Name of the motion; None at rest.
-    t, contact_at : float or None
-        In a motion: normalised time of the least distance, and of the first contact. All before that is certainly
-        free; it may be early where the parts stay within the search's accuracy of contact, or its budget ended.
+    t, contact_at, contact_by : float or None
+        In a motion: normalised time of the least distance, and of the first contact: all before ``contact_at`` is
+        certainly free, and at ``contact_by`` they touch, to within the search's accuracy. These differ where the parts
+        stay within that accuracy of contact, or the search's budget ended.
     reason : str
         Why a verdict is uncertain and what would decide it, or why the pair failed; else empty.
     locator : Locator or None
@@ -59,6 +60,7 @@ class PairResult:
     motion: str | None = None
     t: float | None = None
     contact_at: float | None = None
+    contact_by: float | None = None
     reason: str = ""
     locator: Locator | None = field(default=None, repr=False)
 
@@ -71,7 +73,7 @@ class PairResult:
         """Plain data for JSON: unknown bounds are None."""
         row = {"a": self.a, "b": self.b, "verdict": self.verdict.value, **self.distance.to_dict()}
         if self.motion is not None:
-            row |= {"motion": self.motion, "t": self.t, "contact_at": self.contact_at}
+            row |= {"motion": self.motion, "t": self.t, "contact_at": self.contact_at, "contact_by": self.contact_by}
         if self.reason:
             row["reason"] = self.reason
         if self.where is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -180,7 +181,7 @@ def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Ar
 def _grid(surface: Any, along: str) -> Array:
     """Parameters (n,) of a BRepAdaptor_Surface along "U" or "V": as many between knots as its degree asks for."""
     every = occ.GeomAbs_Shape.GeomAbs_CN
-    knots = _numbers(getattr(surface, f"Nb{along}Intervals")(every) + 1)
+    knots = _array_of_numbers()(1, getattr(surface, f"Nb{along}Intervals")(every) + 1)
     getattr(surface, f"{along}Intervals")(knots, every)
     kinds = occ.GeomAbs_SurfaceType
     has_degree = surface.GetType() in (kinds.GeomAbs_BSplineSurface, kinds.GeomAbs_BezierSurface)
@@ -190,11 +191,12 @@ def _grid(surface: Any, along: str) -> Array:
     return np.append(inner.reshape(-1), starts[-1])
 
 
-def _numbers(count: int) -> Any:
-    """An array of Open CASCADE for so many numbers, by the name that it has in this version or had before."""
+@cache
+def _array_of_numbers() -> Any:
+    """Open CASCADE's class for arrays of numbers, by the name that it has in this version or had before."""
     OCP = require_open_cascade()
     made = getattr(OCP.collections, "Array1_double", None) if hasattr(OCP, "collections") else None
-    return (made or occ.TColStd_Array1OfReal)(1, count)
+    return made or occ.TColStd_Array1OfReal
 
 
 def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:

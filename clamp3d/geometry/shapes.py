@@ -10,10 +10,11 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.errors import InputError
@@ -286,20 +287,29 @@ def sphere(radius: float, *, mesh_error: float | None = None, name: str = "spher
     >>> sphere(10.0, mesh_error=0.1).error < 0.1
     True
     """
-    import trimesh
-
     radius = _size("radius", radius)
     limit = radius / 1000 if mesh_error is None else number("mesh_error", mesh_error)
     if not limit >= FINEST_SPHERE * radius:
         raise InputError(f"mesh_error of a sphere must be >= {FINEST_SPHERE * radius:g} mm, got {mesh_error}")
     for subdivisions in range(9):
-        ball = trimesh.creation.icosphere(subdivisions=subdivisions)
-        gap = 1.0 - float((ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min())
+        vertices, faces, gap = _unit_ball(subdivisions)
         if gap * radius <= limit:
             break
     rounding = 1e-12 * radius
-    mesh = Mesh(name, radius * ball.vertices, ball.faces, True, rounding)
+    mesh = Mesh(name, radius * vertices, faces, True, rounding)
     return Sphere(mesh, name=name, error=gap * radius + rounding, radius=radius)
+
+
+@lru_cache(maxsize=9)
+def _unit_ball(subdivisions: int) -> tuple[Array, NDArray[np.int64], float]:
+    """Corners (n, 3) and triangles (m, 3) of an icosahedron in the unit sphere, subdivided, and how far it is below."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    gap = 1.0 - float((ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min())
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces)
+    faces.flags.writeable = False  # all spheres share them
+    return vertices, faces, gap
 
 
 def groove_block(

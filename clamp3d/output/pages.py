@@ -36,7 +36,7 @@ def _environment(package: str) -> Any:
     import jinja2
 
     from clamp3d.output.palette import VERDICT_COLOURS
-    from clamp3d.output.wording import counted, distance_text, first_text
+    from clamp3d.output.wording import contact_text, counted, distance_text
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "templates"),
@@ -45,6 +45,6 @@ def _environment(package: str) -> Any:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.globals |= {"gap": distance_text, "first_text": first_text, "counted": counted, "degrees": math.degrees}
-    environment.globals |= {"verdict_colours": VERDICT_COLOURS, "version": __version__}
+    environment.globals |= {"gap": distance_text, "contact_text": contact_text, "counted": counted}
+    environment.globals |= {"degrees": math.degrees, "verdict_colours": VERDICT_COLOURS, "version": __version__}
     return environment

@@ -14,7 +14,7 @@ from clamp3d.engine.verdict import Verdict
 from clamp3d.output.baseline import Comparison, compare
 from clamp3d.output.groups import Group, grouped
 from clamp3d.output.tables import text_table
-from clamp3d.output.wording import by_group, counted, distance_text, first_text, group_text, headline, titles
+from clamp3d.output.wording import by_group, contact_text, counted, distance_text, group_text, headline, titles
 
 _LISTED, _PAIRS, _NOTES = 60, 30, 12
 """Groups, pairs and notes that the text lists at most."""
@@ -128,8 +128,7 @@ def _motions(result: CheckResult) -> str:
     rows = []
     for row in by_group(result, result.motions):
         t = "" if row.t is None else f"{row.t:.4f}"
-        contact = "" if row.contact_at is None else first_text(row.contact_at)
-        rows.append((row.motion, *_cells(row), t, contact, row.distance.method))
+        rows.append((row.motion, *_cells(row), t, contact_text(row), row.distance.method))
     return text_table(head, rows, indent=2)
 
 

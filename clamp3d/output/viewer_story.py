@@ -32,7 +32,7 @@ from clamp3d.output.groups import grouped
 from clamp3d.output.palette import VERDICT_COLOURS
 from clamp3d.output.section import Poses as SectionPoses
 from clamp3d.output.section import edge_openings, part_anchor
-from clamp3d.output.wording import by_group, circumstances, distance_text, first_text, sentence, titles
+from clamp3d.output.wording import by_group, circumstances, contact_text, distance_text, sentence, titles, touching_at
 
 Poses: TypeAlias = Mapping[str, Array]
 Pair: TypeAlias = tuple[str, str]
@@ -254,10 +254,10 @@ class Story:
             label = f"{motion.name}: end" + (", through the contact" if contacts else "")
             mark, watched, way = next_mark, pairs, partial(between, t0, t)
             if meets:
-                label = f"{motion.name}: {'next' if k else 'first'} contact at t = {first_text(t)}"
+                label = f"{motion.name}: {'next' if k else 'first'} contact at t = {contact_text(contacts[t][0])}"
                 mark, watched = "" if k else FIRST, tuple((row.a, row.b) for row in contacts[t])
             here = tuple(self.measure(way(1.0), watched))
-            if meets:  # the moment is certain; the distance right there may be certain to the contact threshold only
+            if meets:  # that they touch is certain; the distance there maybe to the contact threshold only
                 here = tuple(replace(row, verdict="contact", what=FIRST, touches=True) for row in here)
             keys, seconds = max(1, math.ceil(abs(going.angle) * (t - t0) / _TURN)), max(0.3, _MOTION * (t - t0))
             yield Stop(motion.name, label, way, here, mark, pairs, keys, seconds, t, halts=meets and k == 0)
@@ -268,7 +268,7 @@ def first_contacts(rows: Iterable[PairResult]) -> dict[float, list[PairResult]]:
     contacts: dict[float, list[PairResult]] = {}
     for row in rows:
         if row.contact_at and row.verdict in (Verdict.CONTACT, *BAD):
-            contacts.setdefault(row.contact_at, []).append(row)
+            contacts.setdefault(touching_at(row), []).append(row)
     return dict(sorted(contacts.items())[:_MEASURED])
 
 

@@ -189,12 +189,30 @@ def circumstances(row: PairResult) -> str:
     """Where a finding is: when in a motion, and where in space parts overlap; or why there is no verdict."""
     details = []
     if row.motion is not None:
-        first = "" if row.contact_at is None else f"first contact at t = {first_text(row.contact_at)}, "
+        first = "" if row.contact_at is None else f"first contact at t = {contact_text(row)}, "
         kind = "deepest" if row.verdict in BAD else "nearest"
         details.append(f"in motion {row.motion!r}" + ("" if row.t is None else f": {first}{kind} at t = {row.t:.4f}"))
     if row.where is not None:
         details.append(where_text(row.where))
     return "; ".join([*details, row.reason] if row.reason else details)
+
+
+def contact_text(row: PairResult) -> str:
+    """The time of a first contact, or from when to when it may be; empty where there is none.
+
+    >>> contact_text(PairResult("a", "b", Verdict.CLASH, Distance(-1.0, -1.0), "push", 0.5, 0.12341, 0.25001))
+    '0.1234 to 0.2501'
+    """
+    if row.contact_at is None:
+        return ""
+    first, seen = first_text(row.contact_at), touching_at(row)
+    return first if seen == row.contact_at else f"{first} to {math.ceil(round(seen * 1e4, 6)) / 1e4:.4f}"
+
+
+def touching_at(row: PairResult) -> float:
+    """A time at which parts touch that do so in a motion: that of the first contact, if it is certain as printed."""
+    at, by = row.contact_at or 0.0, row.contact_by
+    return at if by is None or by - at <= 1e-4 else by
 
 
 def first_text(t: float) -> str:

@@ -199,3 +199,19 @@ def test_a_bare_groove_meets_any_shape_in_either_order():
     block = first_contact(groove, shapes.box((4.0, 4.0, 4.0)), Motion.translate((0, -40.0, 0)), away)
     latest = (20.0 + np.sqrt(49.0 - 4.0) - 2.0) / 40.0
     assert latest - 1e-4 < block.t <= latest  # by meshes of the groove
+
+
+@pytest.mark.parametrize("budget", [5000, 20, 8])
+def test_a_first_contact_that_is_not_certain_is_printed_from_when_to_when_it_may_be(monkeypatch, budget):
+    monkeypatch.setattr(moving_pair, "BUDGET", budget)
+    scene = Scene().add("post", shapes.cylinder(4, 60)).add("ball", shapes.sphere(3.0), translation(-20, 6.9, 5))
+    result = check(scene.with_motion(Motion.translate((40, 0, 0), parts="ball", name="past")))
+    (row,) = result.motions
+    truth = (20.0 - math.sqrt(7.01**2 - 6.9**2)) / 40.0
+    is_sharp = budget == 5000
+    assert row.contact_at - 1e-7 <= truth <= row.contact_by + 1e-6
+    assert (row.contact_by - row.contact_at < 1e-6) == is_sharp
+    (times,) = set(re.findall("first contact at t = (.*), deepest", check_to_text(result) + circumstances(row)))
+    first, _, latest = times.partition(" to ")
+    assert float(first) <= row.contact_at < float(first) + 1e-4
+    assert latest == "" if is_sharp else float(latest) >= row.contact_by
