@@ -19,11 +19,11 @@ from clamp3d.clamp.loader import WireSize, load_clamp
 from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.play import Log, meetings, play
 from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
-from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import HELD, D, S, Section
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_stepped
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.clamp.ways import Closing, Meetings
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array
@@ -97,7 +97,7 @@ def assemble(
     if sequence is not None:
         clamp = replace(clamp, sequence=text("sequence", sequence))
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
-    resolution = {"exact": CONTACT, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
+    resolution = {"exact": TOUCHING, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
     log, start = Log(section, on_waypoint), open_start(section)
     final: FinalState | SteppedState
     if solver == "exact":

@@ -14,9 +14,9 @@ from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
 from clamp3d.clamp.matrix import Pair
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Event, Waypoint
-from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import B, D, Section, W
 from clamp3d.clamp.sequence import Step, as_published
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, Closing, Leg, Offsets, Plan, corners
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache
@@ -104,7 +104,7 @@ def _bring(plan: Plan, k: int, log: Log) -> None:
     step, legs, base, before, end = plan.steps[k], plan.legs[k], plan.bases[k], log.aside, plan.offsets(k + 1)
     pairs, (origin, length) = plan.meeting_pairs(k), legs[0]
     bend, arrival = f"{step.part} before its place, {legs[-1][0]}", f"{step.part} in place, {origin}"
-    meet, travel, within = sorted((min(pair), max(pair)) for pair in pairs), sum(way for _, way in legs), CONTACT
+    meet, travel, within = sorted((min(pair), max(pair)) for pair in pairs), sum(way for _, way in legs), TOUCHING
     if plan.is_published:
         wire, bend, arrival = _PUBLISHED[step.part]
         meet, travel, within = [("P1", wire)], length, math.inf
@@ -174,7 +174,7 @@ def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cach
             if np.array_equal(start, end):
                 continue
             motion = Motion.to_pose(end, parts=b)
-            scene = Scene((Part(a, solids[a]), Part(b, solids[b], start)), CONTACT, 0.0, motions=(motion,))
+            scene = Scene((Part(a, solids[a]), Part(b, solids[b], start)), TOUCHING, 0.0, motions=(motion,))
             if any(row.verdict is not Verdict.CLEAR for row in check(scene, depths=False, cache=cache).rows):
                 met[a, b] = f"{after.step} ({after.label})"
     return met

@@ -11,10 +11,10 @@ from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.geometry.pose import Array
 
-CONTACT = TOUCHING
 
-
-def clamp_scene(clamp: Clamp, poses: Mapping[str, Array], *, clearance: float = 0.0, contact: float = CONTACT) -> Scene:
+def clamp_scene(
+    clamp: Clamp, poses: Mapping[str, Array], *, clearance: float = 0.0, contact: float = TOUCHING
+) -> Scene:
     """The parts P1 to P7 at ``poses`` (``T_world_part``, mm); contacts that the matrix declares are allowed."""
     placed = tuple(Part(name, solid, poses[name]) for name, solid in parts(clamp).items())
     allowed = tuple(Allowed(a, b) for a, row in clamp.connections.items() for b, kind in row.items() if kind)

@@ -7,6 +7,7 @@ penetration depth: the length of the shortest translation that separates them, a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -184,3 +185,7 @@ def _finite(x: float) -> float | None:
 
 def _list(x: Array | None) -> list[float] | None:
     return None if x is None else [float(v) for v in x]
+
+
+Enough = Callable[[Distance], bool]
+"""Whether what is known of a distance is enough for the one who asks."""

@@ -21,7 +21,7 @@ from clamp3d.engine.depth import penetration
 from clamp3d.engine.judge import judge
 from clamp3d.engine.model import Counters, Model, ModelCache, Progress, ignore
 from clamp3d.engine.reasons import failure, undecided
-from clamp3d.engine.refine import accuracy_for, measured, with_normal
+from clamp3d.engine.refine import accuracy_for, boxes_distance, measured, with_normal
 from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
 from clamp3d.engine.scene import Scene, name_pairs
 from clamp3d.engine.verdict import Verdict
@@ -212,7 +212,7 @@ class _Questions:
         a, b, T = self.models[pair.i], self.models[pair.j], pair.T
         allowance = self.scene.allowance(first.name, second.name)
         key = (a, b, allowance, pair.place)
-        start = Distance(pair.gap, level="boxes", method="bounding boxes")
+        start = boxes_distance(pair.gap)
         try:
             if key not in self._answers:
                 self._answers[key] = self._answer(a, b, T, start, allowance)

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.engine.answer import Distance
+from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.depth import depth_of_pieces
 from clamp3d.engine.exact import exact_height
 from clamp3d.engine.mesh_distance import is_deep_inside, within
 from clamp3d.engine.model import Model, box_corners
-from clamp3d.engine.refine import Enough, refine
+from clamp3d.engine.refine import refine
 from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array, inverse, to_target

@@ -7,19 +7,16 @@ but for an error of each triangle.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.engine.answer import Distance
+from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.surface import TURN, Surface, fcl_pair, tree_distance
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
-
-Enough = Callable[[Distance], bool]
 
 CUTS, FEW_CUTS = 100_000, 20_000
 """Triangles that those of an overlap are cut into beyond their number, to bound its thickness: seconds, or much

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.checks import positive
-from clamp3d.engine.answer import Distance
+from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.closed_form import kernel_distance
-from clamp3d.engine.moving_pair import ACCURACY, MovingPair
-from clamp3d.engine.refine import Enough
+from clamp3d.engine.motion_search import ACCURACY
+from clamp3d.engine.moving_pair import MovingPair
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, norm
 from clamp3d.geometry.primitives import LARGEST, AnyCylinder, Cylinder, SweptArc

@@ -7,17 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from clamp3d.engine.answer import Distance
+from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.model import Model, box_corners
-from clamp3d.engine.motion_search import Spent, first_time, least
-from clamp3d.engine.refine import Enough, accuracy_for, from_boxes, refine, with_normal
+from clamp3d.engine.motion_search import ACCURACY, Spent, first_time, least
+from clamp3d.engine.refine import accuracy_for, from_boxes, refine, with_normal
 from clamp3d.engine.swept import HALF_TURN, swept_lower
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import Array, inverse, to_target
 
-ACCURACY = 1e-6
-"""A first contact and a least distance are searched to within this (mm), or to what the models give."""
 CHECKED = 1e-4
 """The same for the least distance of a scene's motion whose verdict is certain: it is a number to print."""
 SHARPENING = 0.04
@@ -48,6 +46,7 @@ class MovingPair:
     """A shape that moves against one that stands; all distances are in the moving shape's frame."""
 
     accuracy = ACCURACY
+    """A first contact and a least distance are searched to within this (mm), or to what the models give."""
     overlaps = 64
     """Times at which a pair is looked at after it was seen to overlap, for a deeper one."""
 

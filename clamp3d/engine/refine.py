@@ -6,12 +6,12 @@ Here pairs of shapes are handed to the methods that measure gaps and interferenc
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from clamp3d.engine.answer import Distance
+from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
@@ -31,13 +31,17 @@ _COINCIDENT = 1e-4
 _OPEN = 1.02
 """Ratio of a bound that decides nothing to the closest that it can be at which it is sharpened no further."""
 
-Enough = Callable[[Distance], bool]
-
 
 def from_boxes(a: Model, b: Model, T: Array) -> Distance:
     """What the boxes of two shapes say, ``b`` at ``T`` (4, 4) in a's frame."""
+    a.counters.queries["boxes"] += 1
     pair = Boxes.of(np.array([a.bounds, b.bounds]), np.array([np.eye(4), T]))
-    return Distance(float(box_gaps(pair, np.array([[0, 1]]))[0]), level="boxes", method="bounding boxes")
+    return boxes_distance(float(box_gaps(pair, np.array([[0, 1]]))[0]))
+
+
+def boxes_distance(gap: float) -> Distance:
+    """The distance of two shapes whose boxes keep ``gap`` mm."""
+    return Distance(gap, level="boxes", method="bounding boxes")
 
 
 def refine(a: Model, b: Model, T: Array, start: Distance, enough: Enough, *, cad_forms: bool = False) -> Distance:

@@ -85,8 +85,8 @@ class PairResult:
 class Work:
     """What an answer took: what was built for it, how often each level was asked, and the seconds of each stage.
 
-    ``shapes``: different ones among the parts; ``candidates``: pairs that the broad phase left; ``decided``: pairs by
-    the level that gave the verdict, without those that failed or are undecided.
+    ``shapes``: different ones among the parts; ``candidates``: pairs that the broad phase left; ``decided``: pairs
+    at rest by the level that gave the verdict, without those that failed or are undecided.
     """
 
     parts: int

@@ -13,7 +13,8 @@ import numpy as np
 
 from clamp3d.checks import short
 from clamp3d.errors import InputError
-from clamp3d.geometry.mesh import Array, Mesh, make_mesh
+from clamp3d.geometry.mesh import Mesh, make_mesh
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape, Shape
 
 MOST_BODIES = 20_000

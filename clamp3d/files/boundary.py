@@ -10,7 +10,7 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import TOLERANCE, bounds_of, explore, occ
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.pose import Array
 
 _BEYOND = 0.05
 """How far (mm) beyond a surface it is asked for the side once more, at most: walls and slots are mostly wider."""

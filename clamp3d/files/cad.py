@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.files.bodies import Component, Reading
 from clamp3d.files.open_cascade import explore, matrix, occ, volume_of
 from clamp3d.files.solid import BrepSolid
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.pose import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.files.open_cascade import explore, from_bytes, occ
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.pose import Array
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 """Kinds of a face; the index is the kind's number in `Surfaces.kind`."""

@@ -25,8 +25,8 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.placing import Placer
 from clamp3d.files.worker import named_file
-from clamp3d.geometry.mesh import Array, IntArray
-from clamp3d.geometry.pose import UNIT_TOLERANCE
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import UNIT_TOLERANCE, Array
 
 _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 _HARMLESS = (

@@ -17,7 +17,8 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.cad import Node, bodies_of
 from clamp3d.files.open_cascade import matrix
 from clamp3d.files.placing import Placer
-from clamp3d.geometry.mesh import Array, IntArray
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
 
 
 def read_object(source: Any) -> tuple[Reading, str]:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import MissingLibraryError
-from clamp3d.geometry.mesh import Array, IntArray
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-6
 """Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""

@@ -26,8 +26,8 @@ from clamp3d.files.open_cascade import (
     volumes_of,
 )
 from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of
-from clamp3d.geometry.mesh import Array, IntArray
-from clamp3d.geometry.pose import to_target
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import distances_from_segments, edge_middles, halves, normals_and_areas
 
 _SLENDER = 400.0

@@ -8,7 +8,8 @@ import numpy as np
 
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
-from clamp3d.geometry.mesh import Array, IntArray, make_mesh
+from clamp3d.geometry.mesh import IntArray, make_mesh
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
 
 

@@ -11,7 +11,8 @@ from clamp3d.files import cad_process
 from clamp3d.files.faces import Surfaces
 from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
 from clamp3d.files.tessellation import Tessellation
-from clamp3d.geometry.mesh import Array, IntArray, Mesh, is_closed
+from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
 
 __all__ = ["CHORD", "BrepSolid", "require_open_cascade"]

@@ -12,7 +12,8 @@ import numpy as np
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
-from clamp3d.geometry.mesh import Array, IntArray
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
 
 ANGLE = 0.35

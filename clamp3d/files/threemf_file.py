@@ -20,7 +20,7 @@ import numpy as np
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import MOST_BODIES, Reading
 from clamp3d.files.placing import Placer
-from clamp3d.geometry.mesh import Array
+from clamp3d.geometry.pose import Array
 
 _UNITS = {"MicroMeter": 1e-3, "MilliMeter": 1.0, "CentiMeter": 10.0, "Meter": 1000.0, "Inch": 25.4, "Foot": 304.8}
 _HARMLESS = re.compile("attribute|namespace|metadata|texture|thumbnail|colou?r|propert|uuid", re.IGNORECASE)

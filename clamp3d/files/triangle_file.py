@@ -17,7 +17,8 @@ import trimesh
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.geometry.mesh import Array, IntArray, edges_of, make_mesh
+from clamp3d.geometry.mesh import IntArray, edges_of, make_mesh
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
 
 _FOLDED = 1e-6
@@ -115,9 +116,9 @@ def _announced_ply(raw: bytes) -> int:
 
 
 def _announced_off(raw: bytes) -> int:
-    header = re.search(rb"^\s*(\w*)OFF\s*(?:#[^\n]*\n\s*)*(\d+)\s+(\d+)[^\n]*\n", raw[:100_000])
+    header = re.search(rb"^\s*(\w*)OFF\s*(?:#[^\n]*\n\s*)*(\d+)[ \t]+(\d+)[^\n]*\n", raw[:100_000])
     if header is None:
-        return 0
+        raise InputError("no OFF file: it must begin with OFF and a line with the numbers of vertices and faces")
     if b"4" in header[1] or b"n" in header[1]:
         raise InputError(f"points of {header[1].decode()}OFF files have more than three coordinates: only OFF is read")
     vertices, faces = int(header[2]), int(header[3])
@@ -128,10 +129,13 @@ def _announced_off(raw: bytes) -> int:
 
 
 def _lines(data: bytes, count: int) -> list[bytes]:
-    """The first ``count`` lines that are neither empty nor a comment. Raises InputError if there are fewer."""
-    lines = re.findall(rb"(?m)^[ \t]*[^\s#][^\r\n]*", data)[:count]
-    if len(lines) < count:
-        raise InputError(f"the file is cut off: {count} lines of vertices and faces are announced, {len(lines)} follow")
+    """The ``count`` lines that are neither empty nor a comment. Raises InputError if there are fewer or more."""
+    lines = re.findall(rb"(?m)^[ \t]*[^\s#][^\r\n]*", data)
+    if len(lines) != count:
+        problem = "cut off" if len(lines) < count else "damaged"
+        raise InputError(
+            f"the file is {problem}: {count} lines of vertices and faces are announced, {len(lines)} follow"
+        )
     return lines
 
 

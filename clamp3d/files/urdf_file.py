@@ -25,8 +25,8 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import FORMATS, read
 from clamp3d.files.placing import Placer
 from clamp3d.files.worker import OUTSIDE, may_read
-from clamp3d.geometry.mesh import Array, IntArray
-from clamp3d.geometry.pose import nearest_rigid
+from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.pose import Array, nearest_rigid
 from clamp3d.geometry.shapes import Shape, box, cylinder, sphere
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -67,9 +67,10 @@ def _triangles(robot: Path, file: str, notes: list[str]) -> tuple[Array, IntArra
     """Vertices and faces of a mesh file, as ROS reads it: numbers without a unit are metres, glTF's axes stay."""
     try:
         path = _mesh_file(robot, file)
-        form = FORMATS.get(path.suffix.lower())
-        if form is None or form.reader.startswith("step"):
-            raise InputError(f"a mesh must be one of {', '.join(FORMATS)}, without STEP")
+        meshes = {kind: form for kind, form in FORMATS.items() if not form.reader.startswith("step")}
+        form = meshes.get(path.suffix.lower())
+        if form is None:
+            raise InputError(f"a mesh must be one of {', '.join(meshes)}")
         mesh = read(path, None if form.unit else "m").complete(path.name).merged(path.name)
     except InputError as error:
         raise InputError(f"{file}: {error}") from None

@@ -13,8 +13,8 @@ from clamp3d.files.faces import CYLINDER, KINDS, PLANE
 from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.axis import Axis, covered, frame, upward
 from clamp3d.fit.features import FitResult, result_of
-from clamp3d.geometry.mesh import Array, IntArray, Mesh
-from clamp3d.geometry.pose import to_source, to_target
+from clamp3d.geometry.mesh import IntArray, Mesh
+from clamp3d.geometry.pose import Array, to_source, to_target
 
 _SAME = 1e-6
 """Cylinders (mm, rad) nearer than this are one: ten times what CAD counts as one point, 1e-7 mm."""

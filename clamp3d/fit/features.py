@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.geometry.mesh import Array, IntArray, Mesh
-from clamp3d.geometry.pose import to_source
+from clamp3d.geometry.mesh import IntArray, Mesh
+from clamp3d.geometry.pose import Array, to_source
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from clamp3d.geometry.triangles import normals_and_areas
 

@@ -9,7 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from clamp3d.fit.axis import Axis
-from clamp3d.geometry.mesh import Array, IntArray, Mesh
+from clamp3d.geometry.mesh import IntArray, Mesh
+from clamp3d.geometry.pose import Array
 
 BoolArray = NDArray[np.bool_]
 

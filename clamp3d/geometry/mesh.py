@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from clamp3d import checks
 from clamp3d.errors import InputError
 from clamp3d.geometry.manifolds import arrays_of, as_manifold
+from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shells import inside_out, joined, sampled, shells, volume, winding_numbers
 from clamp3d.geometry.triangles import normals_and_areas
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LARGEST, SMALLEST = 1e12, 1e-9

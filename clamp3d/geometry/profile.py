@@ -26,6 +26,7 @@ MIN_MESH_ERROR = 1e-6
 """Smallest chord error in mm: a circle of radius 24 then has some 11 000 chords."""
 
 _CLOSURE = 1e-9  # mm; the ends of neighbouring edges are computed by different formulas
+_TOO_NARROW = f"outline must be wider than {_CLOSURE:g} mm"
 _FINE = 1e-4
 """Chord error, relative to the outline's extent, with which an outline is looked at for crossings."""
 
@@ -234,7 +235,7 @@ class Profile:
         error = max(_FINE * extent, MIN_MESH_ERROR)
         corners = self.polygon(error)
         if len(corners) < 3:
-            raise InputError(f"outline must be wider than {_CLOSURE:g} mm")
+            raise InputError(_TOO_NARROW)
         ring = Polygon(corners)
         if ring.is_valid:
             return
@@ -270,6 +271,8 @@ class Profile:
                 edges.append(Segment(start, end))
             if isinstance(piece, Arc):
                 edges.append(piece)
+        if not edges:
+            raise InputError(_TOO_NARROW)
         return cls((*edges[1:], edges[0]) if isinstance(edges[0], Segment) else tuple(edges))
 
     @classmethod

@@ -10,9 +10,9 @@ import numpy as np
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.scene import CONTACT
 from clamp3d.clamp.section import Section
 from clamp3d.clamp.status import Seat, seats
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.section import Poses, edge_openings
 
@@ -65,7 +65,7 @@ def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
     """The state at every waypoint of an assembly."""
     clamp, start, last = assembly.clamp, *_last_step(assembly)
     # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
-    tolerance = max([CONTACT, *(s.gap for s in assembly.seats if s.seated)])
+    tolerance = max([TOUCHING, *(s.gap for s in assembly.seats if s.seated)])
     rows, section = [], Section(clamp, assembly.model)
     for waypoint in assembly.path:
         poses = waypoint.poses
@@ -99,7 +99,7 @@ def tightening(assembly: Assembly) -> list[dict[str, float]]:
     for poses in stages if len(last) == 1 else [before, *(waypoint.poses for waypoint in last)]:
         way = _screwed(poses) - _screwed(before)
         (saddle,) = measure_contacts(assembly.clamp, poses, assembly.model, pairs=[("P2", "P3")])
-        gap = 0.0 if abs(saddle.gap) <= CONTACT else saddle.gap
+        gap = 0.0 if abs(saddle.gap) <= TOUCHING else saddle.gap
         rows.append({"nut_turns": way / assembly.clamp.bolt.pitch, "way_mm": way, "saddle_gap_mm": gap})
     return rows
 

@@ -15,7 +15,7 @@ from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.scene import CONTACT
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError, need
 from clamp3d.output.files import STDOUT, whole_file
@@ -143,7 +143,7 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
     half = 0.045 * run.clamp.up_splint.width
     below = distance_text(contact.distance)
     in_arc = 3 in (contact.declared, contact.type)  # along a line, the section too
-    if contact.point is not None and abs(contact.point[1]) > CONTACT and not in_arc:
+    if contact.point is not None and abs(contact.point[1]) > TOUCHING and not in_arc:
         below += f", {abs(contact.point[1]):.1f} mm {'before' if contact.point[1] < 0.0 else 'behind'} the section"
     if contact.normal is not None and abs(contact.normal[1]) > 0.7:
         half *= 4.0  # nearest across the section: a bolt in its hole, which is seen whole
@@ -204,6 +204,6 @@ def _draw_points(ax: Axes, contacts: Sequence[Contact], *, size: float = 6.0) ->
     """Dots at the contacts' points, in the colours of their verdicts."""
     for contact in contacts:
         if contact.point is not None:
-            verdict = Thresholds(contact=CONTACT).verdict(contact.distance)
+            verdict = Thresholds(contact=TOUCHING).verdict(contact.distance)
             style: dict[str, Any] = {"ms": size, "mec": INK, "mew": 0.7, "mfc": VERDICT_COLOURS[verdict]}
             ax.plot([contact.point[0]], [-contact.point[2]], "o", **style, zorder=40, clip_on=False)

@@ -18,7 +18,8 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
 from clamp3d.clamp.dimensions import TITLES, Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.scene import CONTACT, clamp_scene
+from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.distance import measure
 from clamp3d.engine.model import ModelCache
@@ -346,7 +347,7 @@ class ClampStory(Story):
         ]
         rows.sort(key=lambda row: not row.declared)
         bolt, nut = poses["P4"], poses["P5"]
-        is_on = max(abs(bolt.x - nut.x), abs(bolt.along - nut.along)) < CONTACT
+        is_on = max(abs(bolt.x - nut.x), abs(bolt.along - nut.along)) < TOUCHING
         on = max(0.0, nut.y - bolt.y + self.clamp.nut.height) if is_on else 0.0
         start, first, before = self._latest or (poses, on, 0.0)
         turn = -self.clamp.bolt.turn(on - first)  # clockwise

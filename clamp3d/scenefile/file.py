@@ -15,8 +15,8 @@ from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import Clamp3dError, InputError, escaped
 from clamp3d.geometry import shapes
-from clamp3d.scenefile.parts import prefixed
 from clamp3d.scenefile.pose_table import Pose
+from clamp3d.scenefile.read_parts import prefixed
 from clamp3d.scenefile.tables import FileTable, SceneTable, part_table
 from clamp3d.validation import validate
 

@@ -19,7 +19,7 @@ from clamp3d.files.formats import FORMATS, ROBOT
 from clamp3d.files.objects import read_object
 from clamp3d.geometry.shapes import Fit
 from clamp3d.scenefile.file import load_scene
-from clamp3d.scenefile.parts import Reader, read_parts, to_parts
+from clamp3d.scenefile.read_parts import Reader, read_parts, to_parts
 from clamp3d.scenefile.tables import SceneTable
 
 

@@ -20,8 +20,8 @@ from clamp3d.errors import InputError
 from clamp3d.geometry import shapes
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.primitives import SweptArc
-from clamp3d.scenefile.parts import Reader, names_like, read_parts
 from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
+from clamp3d.scenefile.read_parts import Reader, names_like, read_parts
 from clamp3d.validation import validate
 
 

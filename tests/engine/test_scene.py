@@ -141,6 +141,7 @@ test_bad_input = refusals(
     (lambda: Scene().add("a", BOX, np.eye(3)), r"pose of a must have shape \(4, 4\)"),
     (lambda: Scene().add("a", BOX, translation(0, 0, 2e9)), "offset of pose of a must be three"),
     (lambda: shapes.box((1, 9e-10, 1)), "outline must be wider than 1e-09 mm"),
+    (lambda: shapes.box(1e-10, 1e-10, 1e-10), "outline must be wider than 1e-09 mm"),
     (lambda: Motion.screw((0, 0, 1), angle=1.0, point=(0, 1e18, 0)), "point must be three lengths up to 1e"),
     (lambda: check_poses(Scene().add("a", Cylinder(1, 2)), "a", [np.eye(4), -np.eye(4)]), r"poses\[1\] must"),
     (lambda: Scene().allow(("a", "b")), "allowed: unknown part 'a'; available: none"),

@@ -18,7 +18,7 @@ from clamp3d.shapes import load_mesh
 from tests.docs.project import ROOT
 from tests.files.test_gltf import Gltf
 from tests.files.threemf import TIP, doubled, write_3mf
-from tests.scenefile.test_parts import ROBOT
+from tests.scenefile.test_read_parts import ROBOT
 
 PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()
 COUNT = (len(PIN) - 84) // 50
@@ -76,6 +76,10 @@ def refused(path, message, **options):
         ("a.off", OFF + b"# 3 0 1 2\n", "cut off: 5 lines of vertices and faces are announced, 4 follow"),
         ("a.off", OFF + b"5 0 1 2 3 0\n", "a face has more than four corners"),
         ("a.off", OFF + b"10 0 1 2 3 0 1 2 3 0 1\n", "a face has more than four corners"),
+        ("a.off", OFF + b"3 0 1 2\n3 0 1 3\n", "damaged: 5 lines of vertices and faces are announced, 6 follow"),
+        ("a.off", b"", "it must begin with OFF and a line with the numbers of vertices and faces"),
+        ("a.off", (OFF + b"3 0 1 2\n").replace(b"OFF", b""), "it must begin with OFF"),
+        ("a.off", (OFF + b"3 0 1 2\n").replace(b"4 1", b"4\n1", 1), "it must begin with OFF"),
         ("a.off", b"4" + OFF, "4OFF"),
         ("a.off", b"n" + OFF, "nOFF"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),

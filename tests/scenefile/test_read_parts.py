@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from clamp3d import InputError, check, load
 from clamp3d.scenefile import tables
-from clamp3d.scenefile.parts import read_parts
+from clamp3d.scenefile.read_parts import read_parts
 
 
 @pytest.fixture
