@@ -174,7 +174,6 @@ def _judged(
             if rank[k] == _CLASH:
                 rank[k] = VERDICTS.index(kind_of_overlap(a, b, T[k], thresholds.contact))
                 continue
-            a.counters.queries["boxes"] += 1
             verdict, distance = judge(a, b, T[k], from_boxes(a, b, T[k]), thresholds, allowance)
             rank[k], least[k], most[k] = VERDICTS.index(verdict), distance.lower, distance.upper
         except MissingLibraryError:
