@@ -27,14 +27,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import bisect, linprog, nnls
+from scipy.optimize import bisect, nnls
 
 from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.dimensions import Clamp, Joints
 from clamp3d.clamp.final_state import closed
 from clamp3d.clamp.forces import Force, world_force
 from clamp3d.clamp.matrix import plain
-from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, S, Section
+from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, Gaps, S, Section
 from clamp3d.clamp.torque import coefficients
 from clamp3d.errors import InputError, SolverError
 from clamp3d.geometry.pose import Array
@@ -254,8 +254,8 @@ class FrictionBand:
     def _end(self, friction: float, sense: float) -> End:
         distance, d, tilt = self._extreme(friction, sense)
         best, unbalanced, forces = None, math.inf, np.zeros(0)
-        for q in self._closed_states(d, tilt):
-            balance = Balance(self.section, q, friction)
+        for q, gaps in self._closed_states(d, tilt):
+            balance = Balance(self.section, q, gaps, friction)
             multipliers, left = balance.forces()
             if left < unbalanced:
                 best, unbalanced, forces = balance, left, multipliers
@@ -273,11 +273,14 @@ class FrictionBand:
         aside = np.geomspace(1e-6, 2.0 * stop, _TILTS_BEYOND // 2)
         for tilt in np.concatenate([first - aside, [first], first + aside]):
             d = distance - float(self._splint_distance(np.zeros(1), np.array([tilt]))[0])
-            for q in self._closed_states(d, float(tilt)):
-                yield Balance(self.section, q, friction).refute()
+            for q, gaps in self._closed_states(d, float(tilt)):
+                yield Balance(self.section, q, gaps, friction).refute()
 
-    def _closed_states(self, d: float, tilt: float) -> Iterator[Array]:
-        """States (10,) of the section at d and tilt in which both wires touch both their arcs and nothing overlaps."""
+    def _closed_states(self, d: float, tilt: float) -> Iterator[tuple[Array, Gaps]]:
+        """States (10,) of the section at d and tilt in which both wires touch both their arcs and nothing overlaps.
+
+        Each with its gaps.
+        """
         places = [self._arcs.places(i, np.array(d), np.array(tilt)) for i in range(len(WIRES))]
         for (x6, y6, _), (x7, y7, _) in itertools.product(*places):
             q = np.zeros(SIZE)
@@ -285,7 +288,7 @@ class FrictionBand:
             gaps = self.section.gaps(q)
             touching = {pair for pair, gap in zip(gaps.pair, gaps.value, strict=True) if abs(gap) <= CLOSED}
             if gaps.value.min() >= -CLOSED and {(a, b) for a in ("P1", "P2") for b in WIRES} <= touching:
-                yield q
+                yield q, gaps
 
 
 class Balance:
@@ -295,8 +298,8 @@ class Balance:
     the seven coordinates that move and of the turns of both wires; ``gap`` (m,) is the gap that each belongs to.
     """
 
-    def __init__(self, section: Section, q: Array, friction: float) -> None:
-        self.q, self.gaps = q, section.gaps(q)
+    def __init__(self, section: Section, q: Array, gaps: Gaps, friction: float) -> None:
+        self.q, self.gaps = q, gaps
         edges = []
         for k in np.flatnonzero(np.abs(self.gaps.value) <= CLOSED).tolist():
             a, b = self.gaps.pair[k]
@@ -314,13 +317,13 @@ class Balance:
         return np.asarray(forces), float(left)
 
     def refute(self) -> NoEquilibrium:
-        """The motion of at most 1 in each coordinate that the bolt drives most while no contact force resists it.
+        """A motion of at most 1 in each coordinate that the bolt drives and no contact force resists.
 
-        If any forces f >= 0 balanced the load, ``load = A.T f``, the drive ``load . y = f . A y`` would be <= 0.
+        If any forces f >= 0 balanced the load, ``load = A.T f``, the drive ``load . y = f . A y`` would be <= 0. What
+        the forces that balance it best leave over is such a y, or nothing (the optimality conditions of least squares).
         """
-        motion = linprog(-self.load, self.A, np.zeros(len(self.A)), bounds=(-1.0, 1.0), method="highs").x
-        if motion is None:
-            raise SolverError("friction band: the linear program of a state was not solved")
+        left = self.load - self.forces()[0] @ self.A
+        motion = left / max(float(np.abs(left).max()), 1e-300)
         return NoEquilibrium(motion, float(self.load @ motion), max(0.0, float((self.A @ motion).max(initial=0.0))))
 
     def world_forces(self, forces: Array) -> tuple[Force, ...]:

@@ -182,7 +182,7 @@ def test_certificates(finder):
     assert written["least"]["weakest"]["drive"] == band.least.weakest.drive
     assert written["greatest"]["distance_mm"] == band.greatest.distance
     section, q = finder.section, finder.final.q
-    assert Balance(section, q, 0.1).refute().drive < 1e-7  # in equilibrium there is no such motion
+    assert Balance(section, q, section.gaps(q), 0.1).refute().drive < 1e-7  # in equilibrium there is no such motion
 
 
 def test_least_friction_of_a_measured_distance(finder):
