@@ -269,13 +269,13 @@ class Section:
         the first, for unit changes of q and of the turns of both wires over their radius."""
         origin, down = np.zeros((len(PARTS), 2)), self.down_splint(q)
         origin[1], origin[5], origin[6] = (down.x, down.y), q[:2], q[2:4]
-        total = 0.0
-        for side, sign in ((0, -1.0), (1, 1.0)):
-            part = [_INDEX[names[side]] for names in pair]
-            arm = point - origin[part]
-            moment = push[:, 0] * arm[:, 1] - push[:, 1] * arm[:, 0]
-            total = total + sign * np.einsum("kj,kjn->kn", np.column_stack([push, moment]), self._twists[part])
-        return np.asarray(total)
+        part = [_INDEX[names[side]] for side in (0, 1) for names in pair]
+        wrench = np.empty((len(part), 3))
+        wrench[:, :2] = np.concatenate([-push, push])
+        arm = np.concatenate([point, point]) - origin[part]
+        wrench[:, 2] = wrench[:, 0] * arm[:, 1] - wrench[:, 1] * arm[:, 0]
+        done = (wrench[:, None] @ self._twists[part])[:, 0]
+        return np.asarray(done[: len(pair)] + done[len(pair) :])
 
     def hessian(self, q: Array, gaps: Gaps, force: Array) -> Array:
         """Second derivatives (10, 10) of ``force`` (k,) times the gaps by q.

@@ -335,6 +335,9 @@ class SectionPose:
     along: float = 0.0
 
     def __post_init__(self) -> None:
+        values = self.x, self.y, self.angle, self.along
+        if set(map(type, values)) == {float} and math.isfinite(sum(values)):  # solvers make thousands of them
+            return
         for name in ("x", "y", "angle", "along"):
             object.__setattr__(self, name, number(name, getattr(self, name)))
 
