@@ -41,7 +41,8 @@ class Pieces(NamedTuple):
     """Triangles (m, 3, 3), each off by ``errors`` (m,) mm, and how far (mm) they are from a sheet.
 
     ``middles`` (m,): their middles, from triangle ``nearest`` (m,); ``off`` (m,): the errors of both;
-    ``at_most`` (m,): any point of what they stand for, from what the sheet stands for.
+    ``at_most`` (m,): any point of what they stand for, from what the sheet stands for; ``is_moved`` (m,): whether that
+    is the least of both bounds, not of the first alone, which is quicker.
     """
 
     sheet: Sheet
@@ -51,26 +52,33 @@ class Pieces(NamedTuple):
     middles: Array
     off: Array
     at_most: Array
+    is_moved: NDArray[np.bool_]
 
     @classmethod
     def of(cls, sheet: Sheet, triangles: Array, errors: Array) -> Pieces:
-        """Measured: the least of the distance from one triangle and of a move that takes a piece out of the surface."""
+        """Measured, with the first bound: the distance from one triangle of the sheet."""
         surface = sheet.surface
-        middles, nearest, foot = surface.nearest(triangles.mean(axis=1))
+        middles, nearest, _ = surface.nearest(triangles.mean(axis=1))
         off = errors + sheet.errors[nearest]
         chosen = np.repeat(surface.vertices[surface.faces[nearest]], 3, axis=0)
         corners = triangles.reshape(-1, 3)
         above = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
-        at_most = above + off
-        moves = _moves_beyond(surface, triangles, foot, surface.normals[nearest])
-        moved = np.linalg.norm(moves, axis=1) + errors + sheet.errors.max(initial=0.0)
-        rows = np.flatnonzero(moved < at_most)
+        return cls(sheet, triangles, errors, nearest, middles, off, above + off, np.zeros(len(triangles), dtype=bool))
+
+    def moved(self, rows: IntArray) -> Pieces:
+        """With the second bound of some of them: how long a move is that takes one out of the surface."""
+        surface, pieces, nearest = self.sheet.surface, self.triangles[rows], self.nearest[rows]
+        feet = closest_points(surface.vertices[surface.faces[nearest]], pieces.mean(axis=1))
+        moves = _moves_beyond(surface, pieces, feet, surface.normals[nearest])
+        bound = np.linalg.norm(moves, axis=1) + self.errors[rows] + self.sheet.errors.max(initial=0.0)
+        kept = np.flatnonzero(bound < self.at_most[rows])
         if surface.has_sides:
-            rows = rows[surface.is_outside(triangles[rows] + moves[rows, None])]
+            kept = kept[surface.is_outside(pieces[kept] + moves[kept, None])]
         else:
-            rows = rows[surface.is_crossed(triangles[rows], moves[rows])]
-        at_most[rows] = moved[rows]
-        return cls(sheet, triangles, errors, nearest, middles, off, at_most)
+            kept = kept[surface.is_crossed(pieces[kept], moves[kept])]
+        at_most, is_moved = self.at_most.copy(), self.is_moved.copy()
+        at_most[rows[kept]], is_moved[rows] = bound[kept], True
+        return self._replace(at_most=at_most, is_moved=is_moved)
 
     @property
     def reached(self) -> float:
@@ -118,8 +126,13 @@ def _farthest(pieces: Pieces, floor: float, end: End, cuts: int) -> float:
         bound = float(pieces.at_most.max(initial=0.0))
         sharp = max(floor, float((_SHARP * pieces.middles + pieces.off).max(initial=0.0)))
         largest = (pieces.at_most > sharp) & (pieces.at_most >= 0.5 * (sharp + bound))
+        if not largest.any() or end(bound, pieces.reached):
+            return bound
+        if (fresh := largest & ~pieces.is_moved).any():
+            pieces = pieces.moved(np.flatnonzero(fresh))
+            continue
         cuts -= 2 * int(largest.sum())
-        if not largest.any() or cuts < 0 or end(bound, pieces.reached):
+        if cuts < 0:
             return bound
         pieces = pieces.cut(largest)
 

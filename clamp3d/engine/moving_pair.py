@@ -166,4 +166,4 @@ class MovingPair:
 
         bound, spent = self.between, self.budget()
         t = first_time(distance, self.speed, level, bound=bound, accuracy=self.accuracy, spent=spent)
-        return None if t is None else First(t, by)
+        return None if t is None else First(t, max(by, t))

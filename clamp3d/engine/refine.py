@@ -109,7 +109,7 @@ def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool
     is_found = False
     for overlap in _common_parts(a, b, T, enough, attested, quick=True):
         yield "exact", overlap
-        is_found = bool(np.isfinite(overlap.lower))
+        is_found = is_found or bool(np.isfinite(overlap.lower))
     if not cad_forms:
         yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
     if finer and is_small:
