@@ -112,7 +112,7 @@ def make_mesh(
     V, F = _arrays(vertices, faces, name, scale)
     rounding = float(np.abs(V).max()) * (2.0**-24 if float32 else 2.0**-50)
     notes: list[str] = []
-    V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * _extent(V, name)))
+    V, F = _merge(V, F, max(4.0 * rounding, 1e-9 * _extent(V, name)), name)
     V, F = _cleaned(V, F, rounding, name, notes)
     F = _one_winding(V, F, notes)
     watertight, fault = _closure(V, F)
@@ -284,14 +284,24 @@ def _arrays(vertices: ArrayLike, faces: ArrayLike, name: str, scale: float) -> t
     return V, index.reshape(-1, 3).astype(np.int64)
 
 
-def _merge(V: Array, F: IntArray, tolerance: float) -> tuple[Array, IntArray]:
-    """Merge vertices closer than ``tolerance`` (a tree, not a grid: a grid parts equal points at its lines)."""
+def _merge(V: Array, F: IntArray, tolerance: float, name: str) -> tuple[Array, IntArray]:
+    """Merge equal vertices and, where that leaves a surface open, those closer than ``tolerance`` (mm).
+
+    By a tree, not a grid: a grid parts equal points at its lines. Raises InputError where what is merged is no point.
+    """
     unique, inverse = np.unique(V, axis=0, return_inverse=True)
     F = inverse.reshape(-1)[F].astype(np.int64)
+    if (_edges(F)[1] == 2).all():  # closed, whichever way its triangles are wound
+        return unique, F
     from scipy.spatial import cKDTree
 
     label = joined(cKDTree(unique).query_pairs(tolerance, output_type="ndarray"), len(unique))
     keep, number = np.unique(label, return_inverse=True)
+    if (np.abs(unique - unique[keep][number]) > 2.0 * tolerance).any():
+        raise InputError(
+            f"{name}: open, and vertices are as near to each other as its numbers are rounded ({tolerance:.2g} mm): "
+            "move it nearer to the origin"
+        )
     return unique[keep], number[F]
 
 

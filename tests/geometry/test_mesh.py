@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from trimesh.triangles import closest_point
 
+from clamp3d.errors import InputError
 from clamp3d.geometry.mesh import closed_mesh, edges_of, is_closed, make_mesh
 from clamp3d.geometry.shells import inside_out, shells, volume, winding_numbers
 from clamp3d.geometry.triangles import closest_points
@@ -171,3 +172,16 @@ def test_nearest_points_of_triangles(triangles, points):
     for triangle, point in zip(triangles, found, strict=True):
         shares = scipy.optimize.nnls(np.vstack([triangle.T, np.full(3, 1e3)]), np.append(point, 1e3))
         assert shares[1] < 1e-6
+
+
+def test_of_a_mesh_far_from_the_origin_nothing_is_merged_that_is_apart():
+    """A ball of 0.5 mm, whose corners are closer to each other than numbers in single precision are that far away."""
+    ball = trimesh.creation.icosphere(4, 0.5)
+    V = np.vstack([BOX.vertices, ball.vertices + np.array([9.0, 0.0, 0.0])]) + np.array([3e5, 0.0, 0.0])
+    F = np.vstack([BOX.faces, ball.faces + len(BOX.vertices)])
+    for faces in (F, turned(F, [50])):
+        mesh = make_mesh(V, faces, float32=True)
+        assert (len(mesh.vertices), len(mesh.faces), mesh.watertight) == (len(V), len(F), True)
+        assert mesh.vertices.max(axis=0) == pytest.approx(V.max(axis=0), abs=1e-9)
+    with pytest.raises(InputError, match="open, and vertices are as near to each other as its numbers are rounded"):
+        make_mesh(V, F[:-1], float32=True)
