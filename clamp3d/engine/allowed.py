@@ -55,11 +55,20 @@ class Allowed:
 
     def fits(self, a: str, b: str) -> bool:
         """Whether it speaks of these two names, in either order."""
-        return any(fnmatchcase(x, self.a) and fnmatchcase(y, self.b) for x, y in ((a, b), (b, a)))
+        return any(is_like(x, self.a) and is_like(y, self.b) for x, y in ((a, b), (b, a)))
+
+
+def is_like(name: str, pattern: str) -> bool:
+    """Whether a name is the pattern, in which * stands for any characters, ? for one, and brackets for themselves.
+
+    >>> is_like("pin[1]", "pin[1]"), is_like("pin1", "pin[1]"), is_like("pin[2]", "pin[?]")
+    (True, False, True)
+    """
+    return fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
 def _is_pattern(name: str) -> bool:
-    return any(c in name for c in "*?[")
+    return any(c in name for c in "*?")
 
 
 @dataclass(frozen=True, slots=True)

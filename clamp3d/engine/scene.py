@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clamp3d.checks import instance, items, shown, text
-from clamp3d.engine.allowed import Allowances, Allowed
+from clamp3d.engine.allowed import Allowances, Allowed, is_like
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Component
@@ -163,7 +162,7 @@ class Scene:
 
     def _check_allowed(self, item: Allowed) -> None:
         for name in (item.a, item.b):
-            if name not in self._index and not any(fnmatchcase(part.name, name) for part in self.parts):
+            if name not in self._index and not any(is_like(part.name, name) for part in self.parts):
                 raise InputError(f"allowed: {unknown_part(name, (part.name for part in self.parts))}")
 
     def moved(self, poses: Mapping[str, ArrayLike]) -> Scene:

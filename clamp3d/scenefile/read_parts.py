@@ -7,13 +7,12 @@ import itertools
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 
 from clamp3d import checks
-from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.allowed import Allowed, is_like
 from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Component, Reading, part_name, unique_names
@@ -152,7 +151,7 @@ def _fitted(shape: Shape, reader: Reader) -> Shape:
 
 def _folder(folder: Path, reader: Reader) -> Scene:
     """Every geometry file of a folder, in the order of their names, each where the table of poses puts it."""
-    files = sorted(f for f in folder.iterdir() if f.suffix.lower() in FORMATS and f.is_file())
+    files = sorted(f for f in folder.iterdir() if f.suffix.lower() in FORMATS and not f.is_dir())
     if not files:
         raise InputError(f"{checks.short(folder)}: no geometry file in the folder; choices: {', '.join(FORMATS)}")
     places = read_poses(reader.poses) if reader.poses is not None else [(f.stem, np.eye(4)) for f in files]
@@ -210,6 +209,6 @@ def names_like(patterns: Iterable[str], names: Iterable[str]) -> list[str]:
     available = dict.fromkeys(names)
     matching: dict[str, None] = {}
     for pattern in patterns:
-        fits = [pattern] if pattern in available else [name for name in available if fnmatchcase(name, pattern)]
+        fits = [pattern] if pattern in available else [name for name in available if is_like(name, pattern)]
         matching |= dict.fromkeys(fits or [pattern])
     return list(matching)

@@ -80,6 +80,20 @@ def test_broad_phase_against_brute_force():
     assert sorted(near_pairs(Boxes.of(bounds, T), 2.0).tolist()) == near.tolist()
 
 
+def test_brackets_in_names_stand_for_themselves():
+    """Two pins that a pattern of shells would take for one another, both 0.5 mm in a plate."""
+    pin = shapes.box((10, 10, 10))
+    scene = Scene().add("pin[1]", pin).add("pin1", pin, translation(30, 0, 0))
+    scene = scene.add("plate", shapes.box((60, 10, 10)), translation(15, 0, 9.5))
+    for name, allowed in (
+        ("pin[1]", ["allowed", "clash"]),
+        ("pin[?]", ["allowed", "clash"]),
+        ("pin?", ["clash", "allowed"]),
+    ):
+        result = check(scene.allow((name, "plate"), overlap=1.0), depths=False)
+        assert [result.verdict(pin, "plate").value for pin in ("pin[1]", "pin1")] == allowed
+
+
 def test_pairs_asked_for_and_allowed_contacts(clamp):
     result = check(clamp, pairs=[("P6", "P1"), ("P1", "P2")])
     assert result.work.pairs == 2

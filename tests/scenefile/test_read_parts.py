@@ -70,6 +70,12 @@ def test_no_chord_error_is_so_large_that_bounds_overflow(folder, chord):
         load(folder, chord=chord)
 
 
+def test_a_link_in_a_folder_that_leads_nowhere_is_refused(folder):
+    (folder / "gone.stl").symlink_to(folder / "nothing.stl")
+    with pytest.raises(InputError, match=r"gone\.stl: no such file"):
+        load(folder)
+
+
 def test_two_files_of_one_name_are_refused_by_name(folder):
     (folder / "bolt.obj").write_text("")
     with pytest.raises(InputError, match=r"bolt\.obj and bolt\.ply would both be part 'bolt'"):
