@@ -74,7 +74,7 @@ def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, 
     if verdict in BAD:
         distance = replace(distance.of_overlap(), interference=None)  # at another time they may be deeper
     T = motion.at(t, poses[i])
-    contact_at, contact_by = (None, None) if first is None else (first.t, min(first.by, t))
+    contact_at, contact_by = (None, None) if first is None else (first.t, max(first.t, min(first.by, t)))
     row = PairResult(a, b, verdict, distance.moved(T), motion.name, t, contact_at, contact_by)
     if verdict in BAD:
         return replace(row, locator=Locator(pair.a, pair.b, T, pair.pose(t)))
