@@ -5,15 +5,16 @@ So the faces that the file announces are counted here. This runs in the process 
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 
+from clamp3d.checks import shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.formats import UNITS_MM
@@ -41,13 +42,11 @@ def read_triangles(path: Path, unit: str | None) -> Reading:
 def _arrays(path: Path) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3), in the file's unit."""
     raw, kind = path.read_bytes(), path.suffix[1:].lower()
-    if kind == "obj":  # trimesh passes over lines that begin with blanks, and faces with a comment after them
-        raw = re.sub(rb"(?m)^[ \t]+", b"", re.sub(rb"\\\r?\n", b" ", raw))
-        raw = re.sub(rb"(?m)^([vf][^\r\n#]*)#[^\r\n]*", rb"\1", raw)
+    if kind == "obj":
+        raw = _plain_obj(raw)
     announced = _ANNOUNCED[kind](raw)
-    options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`
-        scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False, **options)
+        scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False)
         meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
     read = sum(len(mesh.faces) for mesh in meshes)
     if not read:
@@ -100,11 +99,47 @@ def _announced_stl(raw: bytes) -> int:
     return announced
 
 
+def _plain_obj(raw: bytes) -> bytes:
+    """The vertices and faces of an OBJ file alone, each corner the number of its vertex from the start of the file.
+
+    trimesh takes numbers < 0, which count back from their line, from the end of the file, and passes over what it does
+    not know. Raises InputError for such lines.
+    """
+    vertices, faces = [], []
+    text = re.sub(rb"#[^\r\n]*", b"", raw.removeprefix(codecs.BOM_UTF8))
+    for line in re.sub(rb"\\(\r\n|\r|\n)", b" ", text).splitlines():
+        keyword, *words = line.split() or [b"o"]
+        if keyword == b"v":
+            if len([float(word) for word in words[:3]]) < 3:
+                raise InputError(f"the file is damaged: a vertex has {len(words)} coordinates")
+            vertices.append(b"v " + b" ".join(words[:3]))
+        elif keyword == b"f":
+            if len(words) < 3:
+                raise InputError(f"the file is damaged: a face has {len(words)} corners")
+            if b"/" in line:  # numbers of texture and normals follow
+                words = [word.partition(b"/")[0] for word in words]
+            corners = [int(word) for word in words]
+            if min(corners) <= 0:
+                corners = [k + len(vertices) + 1 if k < 0 else k for k in corners]
+                words = [b"%d" % k for k in corners]
+            if min(corners) <= 0:
+                raise InputError(f"the file is damaged: {shown(str(line, 'latin-1'))} names no vertex before it")
+            faces.append(b"f " + b" ".join(words))
+        elif keyword not in _OBJ_WITHOUT_FACES:
+            word = shown(str(keyword, "latin-1"))
+            raise InputError(f"a line begins with {word}, which is not read: export it as triangles")
+    return b"\n".join(vertices + faces)
+
+
+_OBJ_WITHOUT_FACES = frozenset(
+    b"vt vn vp l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech stech "
+    b"cstype deg bmat step curv curv2 parm trim hole scrv sp end con csh".split()
+)
+"""Lines of OBJ files that make no faces: all of the specification but those of free-form surfaces and other files."""
+
+
 def _announced_obj(raw: bytes) -> int:
-    corners = [len(line.split()) - 1 for line in re.findall(rb"(?m)^f[ \t][^\r\n#]*", raw)]
-    if min(corners, default=3) < 3:  # trimesh leaves it out
-        raise InputError(f"the file is damaged: a face has {min(corners)} corners")
-    return len(corners)
+    return len(re.findall(rb"(?m)^f", raw))
 
 
 def _announced_ply(raw: bytes) -> int:

@@ -85,6 +85,15 @@ def refused(path, message, **options):
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n", "not a readable OBJ file|damaged|out of range"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf nan\n", "damaged: a face has 1 corners"),
         ("a.obj", WEDGE + b"  f 1 2 # 3\n", "damaged: a face has 2 corners"),
+        ("a.obj", WEDGE + b"f 0 1 2\n", "damaged: 'f 0 1 2' names no vertex before it"),
+        ("a.obj", WEDGE + b"f -1 -2 -7\n", "damaged: 'f -1 -2 -7' names no vertex before it"),
+        ("a.obj", WEDGE + b"3 2 4\n", "a line begins with '3', which is not read: export it as triangles"),
+        ("a.obj", WEDGE + b"f#3 2 4\n", "damaged: a face has 0 corners"),
+        ("a.obj", WEDGE + b": 2 6 4\n", "a line begins with ':', which is not read"),
+        ("a.obj", WEDGE + b"surf 0 1 0 1 1 2 3 4\n", "a line begins with 'surf', which is not read"),
+        ("a.obj", WEDGE.replace(b"10 1 5", b"10 1"), "damaged: a vertex has 2 coordinates"),
+        ("a.obj", WEDGE.replace(b"10 1 5", b"10 1 5/2"), "not a readable OBJ file .*5/2"),
+        ("a.obj", WEDGE.replace(b"10 1 5", b"10 1 5mm"), "not a readable OBJ file .*5mm"),
         ("a.3mf", b"not a zip", "not a readable 3MF file"),
     ],
 )
@@ -119,6 +128,21 @@ def test_a_mesh_without_a_unit_is_taken_as_mm_and_what_is_said_of_it(tmp_path):
     trimesh.creation.box((0.1, 0.2, 0.5)).export(tmp_path / "a.stl")
     (note,) = load_mesh(tmp_path / "a.stl").notes
     assert note.endswith("(largest extent 0.5 mm; if they are metres, unit m makes that 500 mm)")
+
+
+def test_numbers_of_an_obj_that_count_back_do_so_from_their_line(tmp_path):
+    """And a byte order mark is no letter of the first line, nor does a comment go on in the next."""
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+
+    def body(x):
+        corners = "".join(f"v {a + x} {b} {c}\n" for a, b, c in box.vertices)
+        return corners + "".join("f {}/1/1 {} {}\n".format(*face) for face in box.faces - len(box.vertices))
+
+    text = "\ufeff" + body(0.0) + "# the second \\\n" + body(50.0)
+    (tmp_path / "a.obj").write_text(text, encoding="utf-8")
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert np.ptp(mesh.vertices, axis=0).tolist() == [51.0, 2.0, 3.0]
+    assert volume(mesh.vertices, mesh.faces) == pytest.approx(12.0)
 
 
 @pytest.mark.parametrize(
