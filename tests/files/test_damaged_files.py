@@ -39,6 +39,10 @@ WEDGE = (
 """Of triangles and quadrangles, an indented one and comments among them, with 6 degrees from face to face: 25 mm3."""
 
 
+MOVE = "1 0 0 0 1 0 0 0 1 5 0 0"
+"""A transform of 3MF."""
+
+
 def refused(path, message, **options):
     with pytest.raises(InputError, match=message) as caught:
         load(path, **options)
@@ -154,8 +158,20 @@ def test_numbers_of_an_obj_that_count_back_do_so_from_their_line(tmp_path):
         (doubled(15), '<item objectid="16"/>', "more than 20000 bodies"),
         (doubled(50), '<item objectid="51"/>', "more than 20000 bodies"),
         (TIP, "", "no body in the file"),
+        (TIP.replace("<triangle ", "<triangel ", 1), '<item objectid="1"/>', "an element in it is unknown to 3MF"),
+        (TIP, '<item objectid="1"/><itm objectid="1"/>', "an element in it is unknown to 3MF, or in the wrong place"),
+        (doubled(1).replace("<component ", "<compoInnent ", 1), '<item objectid="2"/>', "is unknown to 3MF"),
+        (
+            doubled(1).replace("<component ", f'<component transfrom="{MOVE}" '),
+            '<item objectid="2"/>',
+            "of component must be .*'transfrom'",
+        ),
+        (TIP, f'<item objectid="1" Transform="{MOVE}"/>', "attribute of item must be one of .*, got 'Transform'"),
+        (TIP.replace('x="1"', 'x="1O"'), '<item objectid="1"/>', "damaged: vertex must have numbers, got '1O 0 0'"),
+        (TIP.replace('y="1"', 'y="0x10"'), '<item objectid="1"/>', "vertex must have numbers, got '0 0x10 0'"),
+        (TIP.replace('z="1"', 'z="10mm"'), '<item objectid="1"/>', "vertex must have numbers, got '0 0 10mm'"),
+        (TIP, f'<item objectid="1" transform="{MOVE}O"/>', "item must have numbers, got '1 0 0 0 1 0 0 0 1 5 0 0O'"),
     ],
-    ids=["type", "index", "object", "doubled", "doubled for years", "empty"],
 )
 def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, message):
     refused(write_3mf(tmp_path / "a.3mf", objects, build), message)
@@ -164,7 +180,7 @@ def test_3mf_that_names_too_much_or_what_is_not_there(tmp_path, objects, build, 
 def test_objects_components_and_build_items_of_3mf(tmp_path):
     objects = (
         f'{TIP}<object id="2" type="model" name="pair"><components><component objectid="1"/>'
-        '<component objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/></components></object>'
+        f'<component objectid="1" transform="{MOVE}"/></components></object>'
     )
     build = (
         '<item objectid="2" transform="0 1 0 -1 0 0 0 0 1 0 0 10"/>'
@@ -184,6 +200,8 @@ def test_units_of_3mf(tmp_path):
         (part,) = load(write_3mf(tmp_path / "a.3mf", unit=unit)).parts
         np.testing.assert_allclose(np.ptp(part.shape.mesh.vertices, axis=0), mm, rtol=1e-6)
     refused(write_3mf(tmp_path / "a.3mf", unit="furlong"), "unit must be one of micron, millimeter")
+    noted = TIP.replace("<triangle ", '<triangle paint_color="8" ')  # by a slicer
+    assert len(load(write_3mf(tmp_path / "a.3mf", noted)).parts) == 1
     unnamed, printable = TIP.replace(' name="tip"', ""), '<item objectid="1" printable="1"/>'
     assert [p.name for p in load(write_3mf(tmp_path / "a.3mf", unnamed, printable)).parts] == ["a"]
 
