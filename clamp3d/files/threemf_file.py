@@ -123,6 +123,8 @@ def _matrix(transform: Any) -> Array:
 
 
 def _arrays(obj: Any) -> tuple[Array, Any]:
+    if obj.BeamLattice().GetBeamCount():
+        raise InputError("its beams are not read; export them as triangles")
     V = np.array([list(v.Coordinates) for v in obj.GetVertices()], dtype=np.float64).reshape(-1, 3)
     F = np.array([list(t.Indices) for t in obj.GetTriangleIndices()], dtype=np.int64).reshape(-1, 3)
     return V, F

@@ -17,7 +17,7 @@ from clamp3d.geometry.shells import volume
 from clamp3d.shapes import load_mesh
 from tests.docs.project import ROOT
 from tests.files.test_gltf import Gltf
-from tests.files.threemf import TIP, doubled, write_3mf
+from tests.files.threemf import BEAMS, TIP, doubled, write_3mf
 from tests.scenefile.test_read_parts import ROBOT
 
 PIN = (ROOT / "examples" / "hinge" / "pin.stl").read_bytes()
@@ -167,6 +167,11 @@ def test_numbers_of_an_obj_that_count_back_do_so_from_their_line(tmp_path):
             "of component must be .*'transfrom'",
         ),
         (TIP, f'<item objectid="1" Transform="{MOVE}"/>', "attribute of item must be one of .*, got 'Transform'"),
+        (
+            TIP.replace("</mesh>", BEAMS + "</mesh>"),
+            '<item objectid="1"/>',
+            r"tip \(its beams are not read; export them as",
+        ),
         (TIP.replace('x="1"', 'x="1O"'), '<item objectid="1"/>', "damaged: vertex must have numbers, got '1O 0 0'"),
         (TIP.replace('y="1"', 'y="0x10"'), '<item objectid="1"/>', "vertex must have numbers, got '0 0x10 0'"),
         (TIP.replace('z="1"', 'z="10mm"'), '<item objectid="1"/>', "vertex must have numbers, got '0 0 10mm'"),

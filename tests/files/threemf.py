@@ -15,12 +15,14 @@ RELATIONS = (
 CORNERS = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
 SIDES = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 SOLID = f"<mesh><vertices>{CORNERS}</vertices><triangles>{SIDES}</triangles></mesh>"
+BEAMS = '<b:beamlattice minlength="0.1" radius="1"><b:beams><b:beam v1="0" v2="3"/></b:beams></b:beamlattice>'
 TIP = f'<object id="1" type="model" name="tip">{SOLID}</object>'
 
 
 def write_3mf(path, objects=TIP, build='<item objectid="1"/>', unit="millimeter", method=zipfile.ZIP_DEFLATED):
     model = (
-        f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
+        f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+        f'xmlns:b="http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02">'
         f"<resources>{objects}</resources><build>{build}</build></model>"
     )
     with zipfile.ZipFile(path, "w", method) as archive:
