@@ -20,6 +20,7 @@ _TYPES = re.compile(r"(?<![\w.])([A-Z][A-Z0-9_]*)\s*\(")
 _OPERATOR = "CARTESIAN_TRANSFORMATION_OPERATOR_3D"
 _NUMBER = re.compile(r"-?\d[\d.]*(?:E[-+]?\d+)?", re.IGNORECASE)
 _REFERENCE = re.compile(r"#\s*0*(\d+)(?!\d|\s*=)")
+_UNIT = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*\$\s*,\s*#\s*0*(\d+)")
 _FILE = re.compile(r"DOCUMENT_FILE\s*\(\s*'([^']+\.(?:stp|step))'", re.IGNORECASE)
 _PARTS = re.compile(
     "ADVANCED_FACE|FACE_SURFACE|(CLOSED|OPEN)_SHELL|EDGE_LOOP|FACE_(OUTER_)?BOUND|ORIENTED_EDGE|MANIFOLD_SOLID_BREP|"
@@ -43,7 +44,11 @@ class Announced:
 
 
 def announced(path: Path) -> Announced:
-    """What the file announces. Raises InputError for entities of one number, with which Open CASCADE may not end."""
+    """What the file announces.
+
+    Raises InputError for entities of one number, with which Open CASCADE may not end, and units made of what is no
+    length or angle, whose size it takes to be 1.
+    """
     raw = path.read_bytes().decode("latin-1")
     text = _NOISE.sub(lambda m: "$" if m[0][0] == "'" else " ", raw)
     records = _RECORD.findall(text)
@@ -54,6 +59,9 @@ def announced(path: Path) -> Announced:
         number: _TYPES.findall(content) if content[0] == "(" else [content.partition("(")[0].rstrip()]
         for number, content in records
     }
+    for number in _UNIT.findall(text):
+        if not any(kind.endswith("MEASURE_WITH_UNIT") for kind in types.get(number, ())):
+            raise InputError(f"the STEP file is damaged: #{number}, which a unit is made of, is no measure")
     contents = dict(records)
     unused = types.keys() - set(_REFERENCE.findall(text))
     return Announced(

@@ -29,9 +29,10 @@ _OTHERS = re.compile(
 """Bodies that Open CASCADE does not make into solids."""
 _FAULT = re.compile(
     r"Parsing|Unresolved|not a Real|\((transform_item_[12]|location|axis|ref_direction)\)|"
+    r"Enumeration si_(prefix|unit_name)|\(prefix\)|\(unit\) : Entity has illegal type|"
     r"Count of Parameters is not \d+ for (axis2|cartesian|direction|item_defined)"
 )
-"""What Open CASCADE says of numbers and places that it then takes to be 0, or leaves out."""
+"""What Open CASCADE says of numbers, units and places that it then takes to be 0, or leaves out."""
 _PLACE = "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"
 
 
