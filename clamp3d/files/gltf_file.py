@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 import trimesh
 
-from clamp3d.checks import shown
+from clamp3d.checks import choice, shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import UNITS_MM
@@ -41,6 +41,13 @@ _HARMLESS = (
 """Required extensions that change no body, and the one whose numbers are scaled here."""
 _INSTANCES = "EXT_mesh_gpu_instancing"
 """The extension that places a node's mesh many times, which files may use without requiring it."""
+_KEYS = {
+    "nodes": "camera children skin matrix mesh rotation scale translation weights",
+    "accessors": "bufferView byteOffset componentType normalized count type max min sparse",
+    "bufferViews": "buffer byteOffset byteLength byteStride target",
+    "primitives": "attributes indices material mode targets",
+}
+"""What glTF 2.0 allows in those besides names, extensions and extras: a misspelt place is none to trimesh."""
 _TRIANGLES, _STRIP = 4, 5
 _NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a whole number is divided by where an accessor says "normalized"."""
@@ -52,6 +59,7 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
     placer = Placer(UNITS_MM[unit or "m"], _Z_UP)
     if tree.get("skins") or any("targets" in p for mesh in tree.get("meshes", []) for p in mesh["primitives"]):
         placer.notes.append("skins and morph targets are left at rest")
+    _check_keys(tree)
     nodes = _nodes(tree)
     names = [node.get("name") or tree["meshes"][node.get("mesh", 0)].get("name") for node in tree["nodes"]]
     meshes = {k: _Mesh(tree, k) for k in {tree["nodes"][n]["mesh"] for n in nodes}}
@@ -76,6 +84,10 @@ def read_gltf(path: Path, unit: str | None) -> Reading:
             placer.place(name, k, meshes[k].arrays, scene.graph.get(str(n))[0])
         else:
             placer.notes.append(f"{name}: points or lines, left out")
+    read = set(nodes)
+    for n, node in enumerate(tree["nodes"]):
+        if "mesh" in node and n not in read:
+            placer.add(str(names[n] or path.stem), f"node {n} is not in the scene that is read", np.eye(4))
     return placer
 
 
@@ -108,6 +120,14 @@ def _beside(path: Path, name: str) -> bytes:
         return named_file(path, name).read_bytes()
     except OSError as error:
         raise InputError(f"names {shown(name)}: {error.strerror}") from None
+
+
+def _check_keys(tree: dict[str, Any]) -> None:
+    primitives = [primitive for mesh in tree.get("meshes", []) for primitive in mesh["primitives"]]
+    for kind, keys in _KEYS.items():
+        for item in primitives if kind == "primitives" else tree.get(kind, []):
+            for key in item:
+                choice(f"a key of {kind}", key, [*keys.split(), "name", "extensions", "extras"])
 
 
 def _nodes(tree: dict[str, Any]) -> list[int]:

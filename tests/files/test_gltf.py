@@ -187,6 +187,14 @@ def bad_cube(g, accessor=None, **primitive):
         (lambda g: bad_cube(g, lambda accessor: accessor.pop("bufferView")), "sparse or empty numbers are not read"),
         (lambda g: bad_cube(g, lambda accessor: accessor.update(sparse={})), "sparse or empty numbers are not read"),
         (lambda g: bad_cube(g) or g.data["accessors"][-1].update(sparse={}), "sparse or empty numbers are not read"),
+        (lambda g: g.node(mesh=0, matix=np.eye(4).ravel().tolist()), "a key of nodes must be one of .*, got 'matix'"),
+        (lambda g: bad_cube(g, lambda accessor: accessor.update(bteOffset=4)), "key of accessors .*, got 'bteOffset'"),
+        (lambda g: g.data["bufferViews"][0].update(byteStrid=16), "key of bufferViews must be .*, got 'byteStrid'"),
+        (lambda g: bad_cube(g, indces=0), "a key of primitives must be one of .*, got 'indces'"),
+        (
+            lambda g: g.node(name="bad", mesh=0) and g.data.update(scenes=[{"nodes": [0]}]),
+            r"only 1 of 2 bodies read; missing: bad \(node 1 is not in the scene that is read\)",
+        ),
         (lambda g: bad_cube(g, mode=6), "triangles of mode 6 are not read"),
     ],
 )
