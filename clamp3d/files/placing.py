@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 
 import numpy as np
@@ -27,11 +28,12 @@ class Placer(Reading):
 
         A scale, shear or reflection in ``T`` goes into the vertices. Raises InputError for too many bodies.
         """
-        if not np.isfinite(T).all() or abs(np.linalg.det(T[:3, :3])) < 1e-12:
+        scales = np.linalg.svd(T[:3, :3], compute_uv=False) if np.isfinite(T).all() else np.zeros(3)
+        if not scales[2] > 1e-12 * scales[0] > 1e-100:
             self.add(name, "its placement is flat or not finite", T)
             return
         pose, form = rigid_part(T)
-        own = (key, form.round(12).tobytes())
+        own = (key, form.round(12 - round(math.log10(scales[0]))).tobytes())
         if own not in self._shapes:
             self._shapes[own] = self._shape(name, arrays, form)
         place = np.eye(4)

@@ -44,6 +44,16 @@ def test_a_trimesh_scene():
         load(dot)
 
 
+@pytest.mark.parametrize("scale", [1e-13, 1e-5, 1e5])
+def test_places_may_scale_by_any_factor(scale):
+    source = trimesh.Scene({"box": trimesh.creation.box((1.0 / scale, 2.0 / scale, 3.0 / scale))})
+    for name, factor in (("box", 1.0), ("twice", 2.0), ("again", 1.0)):
+        source.graph.update(name, geometry="box", matrix=np.diag([*[factor * scale] * 3, 1.0]))
+    scene = load(source)
+    assert sorted(volumes(scene)) == pytest.approx([6.0, 6.0, 48.0], rel=1e-6)
+    assert len({id(part.shape) for part in scene.parts}) == 2
+
+
 def test_what_is_no_body_is_refused():
     for thing in (3, object(), [1, 2], None, SimpleNamespace(wrapped=None)):
         with pytest.raises(InputError, match="source must be a path, a clamp's name, or an object of CadQuery"):
