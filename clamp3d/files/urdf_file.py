@@ -31,6 +31,26 @@ from clamp3d.geometry.shapes import Shape, box, cylinder, sphere
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 """Those of the URDF specification."""
+_SHAPE = ("origin", "geometry", "material", "verbose", "contact", "contact_coefficients", "surface", "gazebo")
+_ELEMENTS = {
+    "link": ("inertial", "visual", "collision", "self_collision_checking", "contact", "sensor", "gazebo"),
+    "joint": (
+        *("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller"),
+        *("safety", "joint_properties", "sensor", "gazebo"),
+    ),
+    "collision": _SHAPE,
+    "visual": _SHAPE,
+    "geometry": ("box", "cylinder", "sphere", "mesh"),
+}
+"""What elements that hold bodies and places may hold: the specification's, and those that simulators give them."""
+_ATTRIBUTES = {
+    "origin": ("xyz", "rpy"),
+    "axis": ("xyz", "rpy"),  # the latter without a meaning, but it is written
+    "limit": ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"),
+    "mimic": ("joint", "multiplier", "offset"),
+    "mesh": ("filename", "scale"),
+}
+"""Attributes of elements whose attributes may be left out."""
 
 
 def read_urdf(path: Path, joints: dict[str, float]) -> Reading:
@@ -122,6 +142,9 @@ def _check_whole(root: ElementTree.Element) -> None:
             raise InputError(f"each {item.tag} of a link must have 1 shape, got {count}")
     for joint in root.findall("joint"):
         checks.choice(f"type of joint {joint.get('name')}", joint.get("type"), JOINT_TYPES)
+        for mimic in joint.findall("mimic"):
+            joints = [other.get("name", "") for other in root.findall("joint")]
+            checks.choice(f"joint that {joint.get('name')} follows", mimic.get("joint"), joints)
     tree: Any = networkx.MultiDiGraph()
     tree.add_nodes_from(link.get("name") for link in root.findall("link"))
     count = len(tree)
@@ -131,6 +154,24 @@ def _check_whole(root: ElementTree.Element) -> None:
         raise InputError(f"a joint must connect links, got {checks.shown([*tree][count])}")
     if not networkx.is_arborescence(tree):
         raise InputError("the joints must make one tree of all links, in which none is the child of two")
+    for item in (*root.findall("link"), *root.findall("joint")):
+        _check_known(item)
+
+
+def _check_known(item: ElementTree.Element) -> None:
+    """Raise InputError for elements and attributes that would be passed over; those of a namespace may be."""
+    below = [*item] if item.tag in _ELEMENTS else []
+    for names, known in (
+        ([*item.attrib], _ATTRIBUTES.get(item.tag)),
+        ([child.tag for child in below], _ELEMENTS.get(item.tag)),
+    ):
+        for name in names:
+            if known and name not in known and not name.startswith("{"):
+                raise InputError(
+                    f"not a readable URDF file (<{item.tag}> has {checks.shown(name)}, not one of {', '.join(known)})"
+                )
+    for child in below:
+        _check_known(child)
 
 
 def _joint_values(robot: Any, values: dict[str, float]) -> dict[str, float]:

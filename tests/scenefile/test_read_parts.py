@@ -141,6 +141,21 @@ def test_joint_values_that_do_not_go(robot, joints, message):
         load(robot, joints=joints)
 
 
+def test_what_robots_hold_besides_bodies_and_places(robot):
+    more = (
+        '<material name="red"><color rgba="1 0 0 1"/></material><transmission name="t"><type>a/b</type></transmission>'
+        '<gazebo reference="tip"><mu1>1</mu1></gazebo><ros2_control name="r" type="system"/></robot>'
+    )
+    inertial = '<inertial><origin xyz="0 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    text = ROBOT.replace("</robot>", more).replace("<robot ", '<robot xmlns:d="http://drake.mit.edu" ')
+    text = text.replace('<link name="tip">', f'<link name="tip">{inertial}<contact/><d:x/>')
+    text = text.replace(
+        '<axis xyz="1 0 0"/>', '<axis xyz="1 0 0" d:y="1"/><dynamics damping="1"/><mimic joint="turn"/>'
+    )
+    robot.write_text(text)
+    assert [p.name for p in load(robot, joints={"turn": 0.02}).parts] == ["base", "rail", "tip_1", "tip_2"]
+
+
 def test_a_continuous_joint_turns_by_any_angle(robot):
     robot.write_text(ROBOT.replace("revolute", "continuous"))
     rail = load(robot, joints={"turn": -5.0}).parts[1]
