@@ -46,7 +46,14 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
         raw = _plain_obj(raw)
     announced = _ANNOUNCED[kind](raw)
     with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`
-        scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False)
+        try:
+            scene = trimesh.load_scene(io.BytesIO(raw), file_type=kind, process=False)
+        except ValueError as error:
+            if "PLY is unexpected length" not in str(error):
+                raise
+            raise InputError(
+                "the file is cut off, or its faces have different numbers of corners: export it as triangles"
+            ) from None
         meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
     read = sum(len(mesh.faces) for mesh in meshes)
     if not read:
@@ -145,6 +152,8 @@ def _announced_obj(raw: bytes) -> int:
 def _announced_ply(raw: bytes) -> int:
     end = max(0, raw.find(b"end_header", 0, 100_000))
     counts = {name: int(number) for name, number in re.findall(rb"element\s+(\w+)\s+(\d+)", raw[:end])}
+    if counts.get(b"tristrips"):
+        raise InputError("triangle strips are not read: export it as a list of triangles")
     if b"ascii" in raw[: min(end, 100)]:
         _lines(raw[end + len(b"end_header") :], sum(counts.values()))
     return counts.get(b"face", 0)
