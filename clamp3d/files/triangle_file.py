@@ -10,6 +10,7 @@ import io
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -24,6 +25,8 @@ from clamp3d.geometry.shapes import MeshShape
 
 _FOLDED = 1e-6
 """1 less the cosine of the angle (0.08 deg) to which two faces that share an edge are one on the other."""
+
+_MIXED = "the file is cut off, or its faces have different numbers of corners: export it as triangles"
 
 
 def read_triangles(path: Path, unit: str | None) -> Reading:
@@ -51,10 +54,10 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
         except ValueError as error:
             if "PLY is unexpected length" not in str(error):
                 raise
-            raise InputError(
-                "the file is cut off, or its faces have different numbers of corners: export it as triangles"
-            ) from None
+            raise InputError(_MIXED) from None
         meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
+    if any(_is_mixed(mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")) for mesh in meshes):
+        raise InputError(_MIXED)
     read = sum(len(mesh.faces) for mesh in meshes)
     if not read:
         raise InputError("no triangles in the file")
@@ -65,6 +68,13 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
     if read > announced:  # some faces have more than three corners
         _require_no_folds(vertices, faces)
     return vertices, faces
+
+
+def _is_mixed(faces: Any) -> bool:
+    """Whether binary faces of a PLY file have other lengths than the first, which trimesh takes to be that of all."""
+    names = faces.dtype.names if isinstance(faces, np.ndarray) else None
+    lists = [faces[name] for name in names or () if faces[name].dtype.names]
+    return any((column["f0"] != column["f1"].shape[1]).any() for column in lists)
 
 
 def _require_no_folds(vertices: Array, faces: IntArray) -> None:

@@ -33,6 +33,9 @@ OFF = b"OFF\n4 1 0\n" + CORNERS
 NOTCHED_PLY = PLY[: PLY.index(b"0 0 0")].replace(b"vertex 3", b"vertex 4").replace(b"face 2", b"face 1") + CORNERS
 MIXED_PLY = NOTCHED_PLY[: -len(CORNERS)].replace(b"ascii", b"binary_little_endian").replace(b"face 1", b"face 2")
 MIXED_PLY += struct.pack("<12fB3iB4i", *map(float, CORNERS.split()), 3, 0, 1, 2, 4, 0, 1, 2, 3)
+SHIFTED_PLY = MIXED_PLY[:-30].replace(b"face 2", b"face 3")
+SHIFTED_PLY += struct.pack("<B4iB3iB5i", 4, 0, 1, 2, 3, 3, 0, 1, 2, 5, 0, 1, 2, 3, 0)
+"""As long as three faces of four corners, which the first one has."""
 NOTCHED_OBJ = b"".join(b"v " + line + b"\n" for line in CORNERS.splitlines()) + b"f 1 2 3 4\n"
 WEDGE = (
     b"v 0 0 0 # first\nv 10 0 0\nv 10 1 0\nv 0 0 5\nv 10 0 5\nv 10 1 5\n"
@@ -77,6 +80,7 @@ def refused(path, message, **options):
         ("a.ply", PLY, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
         ("a.ply", PLY + b"2 0 1\n", "damaged: it announces 2 faces, 1 were read"),
         ("a.ply", MIXED_PLY, "cut off, or its faces have different numbers of corners: export it as triangles"),
+        ("a.ply", SHIFTED_PLY, "cut off, or its faces have different numbers of corners: export it as triangles"),
         ("a.ply", PLY.replace(b"end_h", b"element tristrips 1\nend_h"), "triangle strips are not read: export it as a"),
         ("a.ply", NOTCHED_PLY + b"4 0 1 2 3\n", "a face folds back onto its neighbour"),
         ("a.obj", NOTCHED_OBJ, "a face folds back onto its neighbour"),
