@@ -12,7 +12,8 @@ import os
 import stat
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,32 @@ def shown(value: object) -> str:
     return text if len(text) <= 80 and not (isinstance(value, str) and len(value) > 80) else text[:76] + " ..."
 
 
+_READ: list[set[str]] = []
+"""Of each block of `files_read` that has begun: the files that were read in it."""
+
+
+@contextmanager
+def files_read() -> Iterator[set[str]]:
+    """The real paths of the files that are read in the block: a set that grows."""
+    files: set[str] = set()
+    _READ.append(files)
+    try:
+        yield files
+    finally:
+        _READ.pop()
+
+
+def note_read(files: Iterable[str | Path]) -> None:
+    """Note files as read, for the blocks of `files_read` that this is called in."""
+    for read in _READ:
+        read.update(map(os.path.realpath, files))
+
+
+def is_read(path: Path) -> bool:
+    """Whether a file was read in a block of `files_read` that this is called in."""
+    return any(os.path.realpath(path) in read for read in _READ)
+
+
 def readable_file(path: Path, most: float = math.inf) -> int:
     """Size in bytes of a regular file (no folder, pipe or device) of at most ``most`` bytes."""
     try:
@@ -52,6 +79,7 @@ def readable_file(path: Path, most: float = math.inf) -> int:
         raise InputError(f"{short(path)}: not a regular file")
     if status.st_size > most:
         raise InputError(f"{short(path)}: {status.st_size} bytes, at most {most:.0f} are read")
+    note_read([path])
     return status.st_size
 
 

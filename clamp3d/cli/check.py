@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from clamp3d.checks import short
+from clamp3d.checks import note_read, short
 from clamp3d.clamp.loader import builtin_clamps
 from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import (
@@ -82,6 +82,7 @@ class Check(Source, Quiet):
 
     def run(self) -> None:
         """Check, print and write."""
+        note_read([accepted_file(self.source)])
         subject = opened(self.load())
         assembled = subject if isinstance(subject, Assembly) else None
         scene = subject.scene if isinstance(subject, Assembly) else subject

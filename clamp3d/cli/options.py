@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from types import UnionType
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union, get_args, get_
 import click
 
 from clamp3d.baselines import METHODS, contact_model
+from clamp3d.checks import files_read, note_read
 from clamp3d.cli.terminal import STDOUT_TAKEN, bar, show
 from clamp3d.errors import need
 
@@ -139,34 +140,39 @@ def command(name: str) -> Callable[[type[Any]], click.Command]:
         def call(**values: Any) -> None:
             instance = kind()
             vars(instance).update(values)
-            _keep_apart(parameters, values)
-            instance.run()
+            with files_read():
+                note_read(_inputs(parameters, values))
+                check_outputs(parameters.values(), values)
+                instance.run()
 
         return click.Command(name, params=[*parameters.values()], callback=call, help=inspect.getdoc(kind))
 
     return decorate
 
 
-def _keep_apart(parameters: Mapping[str, click.Parameter], values: Mapping[str, Any]) -> None:
-    """Refuse that a file is written over another one, or over what the command reads."""
-    from clamp3d.output.files import STDOUT, keep, require_not_kept
-
-    arguments = [values[name] for name, p in parameters.items() if isinstance(p, click.Argument) and p.nargs == 1]
-    read = [Path(value) for value in arguments if value and os.path.exists(value)]
-    keep(file for path in read for file in ([path] if path.is_file() else _files_with_parts(path)))
-    written: dict[str, str] = {}
-    for name, parameter in parameters.items():
-        if isinstance(parameter.type, Output) and values[name] not in (None, STDOUT):
-            require_not_kept(values[name])
-            other = written.setdefault(os.path.realpath(values[name]), parameter.opts[0])
-            if other != parameter.opts[0]:
-                raise click.UsageError(f"{other} and {parameter.opts[0]} are one file: {values[name]}")
-
-
-def _files_with_parts(folder: Path) -> list[Path]:
+def _inputs(parameters: Mapping[str, click.Parameter], values: Mapping[str, Any]) -> Iterator[Path]:
+    """The files that a command is given to read; of a folder those with parts."""
     from clamp3d.files.formats import FORMATS
 
-    return [file for file in folder.iterdir() if file.suffix.lower() in FORMATS]
+    for name, parameter in parameters.items():
+        is_argument = isinstance(parameter, click.Argument) and parameter.nargs == 1
+        if values[name] and (is_argument or parameter.type is INPUT_FILE) and os.path.exists(values[name]):
+            path = Path(values[name])
+            yield from [f for f in path.iterdir() if f.suffix.lower() in FORMATS] if path.is_dir() else [path]
+
+
+def check_outputs(parameters: Iterable[click.Parameter], values: Mapping[str, Any]) -> None:
+    """Refuse that a file is written over another one, or over one that was read."""
+    from clamp3d.output.files import STDOUT, require_not_read
+
+    written: dict[str, str] = {}
+    for parameter in parameters:
+        path = values[parameter.name or ""]
+        if isinstance(parameter.type, Output) and path not in (None, STDOUT):
+            require_not_read(path)
+            other = written.setdefault(os.path.realpath(path), parameter.opts[0])
+            if other != parameter.opts[0]:
+                raise click.UsageError(f"{other} and {parameter.opts[0]} are one file: {path}")
 
 
 def _wires(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
@@ -244,7 +250,10 @@ class Source(ClampSource):
         """A clamp, or a scene from a scene file or any file that holds bodies."""
         from clamp3d.scenefile.load import load
 
-        return load(**{key: getattr(self, key) for key in (*ClampSource.__annotations__, *Source.__annotations__)})
+        loaded = load(**{key: getattr(self, key) for key in (*ClampSource.__annotations__, *Source.__annotations__)})
+        context = click.get_current_context()
+        check_outputs(context.command.params, context.params)  # again: now it is known what INPUT names
+        return loaded
 
 
 SEQUENCE: Any = option(

@@ -82,12 +82,15 @@ class Reading:
         What was assumed or repaired, and what the file holds besides bodies.
     joined : list of (str, str) or None
         Of a robot: names of the links that a joint connects; bodies of one name are one link.
+    files : set of str
+        Files that the file names and that were read for it.
     """
 
     bodies: list[Body] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     joined: list[tuple[str, str]] | None = None
+    files: set[str] = field(default_factory=set)
 
     def add(self, name: str, shape: Shape | str, T: Array, component: Component | None = None) -> None:
         """One more body at ``T`` (4, 4), or why it has no shape. Raises InputError for too many bodies."""

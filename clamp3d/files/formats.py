@@ -84,7 +84,10 @@ def read(path: Path, option: Any = None) -> Reading:
 def read_any(path: Path, option: Any, outside: bool) -> Reading:
     """The same for another process; ``outside``: whether the file may name others outside of its folder."""
     os.environ[OUTSIDE] = str(int(outside))  # the settings of the process that asks may change
-    return read(path, option)
+    with checks.files_read() as files:
+        reading = read(path, option)
+    reading.files = files
+    return reading
 
 
 def load_bodies(

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clamp3d.checks import readable_file, short, shown
+from clamp3d.checks import note_read, readable_file, short, shown
 from clamp3d.errors import InputError
 from clamp3d.files.child import Worker, WorkerEndedError, WorkerTimeoutError
 
@@ -62,6 +62,7 @@ def read_in_process(path: Path, option: Any = None) -> Reading:
         reading: Reading = process().call(
             "clamp3d.files.formats:read_any", *arguments, time_limit=seconds, memory=memory
         )
+        note_read(reading.files)
         return reading
     except WorkerTimeoutError:
         problem = f"not read in {seconds:.0f} s; {LIMITS}=4 allows four times as much"
@@ -84,6 +85,7 @@ def named_file(path: Path, name: str) -> Path:
     """The file beside ``path`` that this file names. Raises InputError unless it may be read."""
     if not may_read(path.parent / name, path.parent):
         raise InputError(f"names {shown(name)}, which is outside of its folder; {OUTSIDE}=1 allows that")
+    note_read([path.parent / name])
     return path.parent / name
 
 

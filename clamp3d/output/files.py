@@ -8,30 +8,22 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from clamp3d.checks import short
+from clamp3d.checks import is_read, short
 from clamp3d.errors import InputError
 
 STDOUT = Path("-")
 """As the path of a file to write: standard output."""
-_KEPT: set[Path] = set()
-"""Files that are not written over: what the command reads."""
 
 
-def keep(files: Iterable[Path]) -> None:
-    """Refuse from now on to write over these files, and over no others."""
-    _KEPT.clear()
-    _KEPT.update(Path(os.path.realpath(file)) for file in files)
-
-
-def require_not_kept(path: Path) -> None:
-    """Raise InputError if a file is one of those that are kept: to be called before long work."""
-    if Path(os.path.realpath(path)) in _KEPT:
-        raise InputError(f"cannot write {short(path)}: it is the input")
+def require_not_read(path: Path) -> None:
+    """Raise InputError if the command has read the file: to be called before long work."""
+    if is_read(path):
+        raise InputError(f"cannot write {short(path)}: it is the input, or belongs to it")
 
 
 @contextmanager
@@ -42,7 +34,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     so is standard output for the path ``-``. Raises InputError if the folder does not exist or cannot be written to,
     or the disk is full.
     """
-    require_not_kept(path)
+    require_not_read(path)
     target = Path(os.path.realpath(path))
     special = path == STDOUT or (target.exists() and not target.is_file() and not target.is_dir())
     with ExitStack() as stack:

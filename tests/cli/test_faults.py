@@ -176,3 +176,46 @@ def test_no_file_is_written_over_what_is_read_or_over_another(tmp_path, monkeypa
         assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     for _ in range(2):  # results may be written again, also beside the input
         assert main("check", ".", "--json", "result.json", "--quiet")[0] == 0
+
+
+ROBOT = (
+    '<robot name="r"><link name="a"><collision><geometry><mesh filename="a.stl"/></geometry></collision></link></robot>'
+)
+
+
+@posix
+@pytest.mark.parametrize(
+    ("command", "victim"),
+    [
+        ("check scene.toml --json a.stl", "a.stl"),
+        ("check scene.toml --csv new.csv --json parts/b.stl", "b.stl"),
+        ("export scene.toml -o a.stl", "a.stl"),
+        ("export scene.toml -f stl -o .", "a.stl"),
+        ("view scene.toml --html parts/b.stl", "b.stl"),
+        ("check parts --poses poses.csv --json poses.csv", "poses.csv"),
+        ("check scene.toml --baseline last.json --json last.json", "last.json"),
+        ("check scene.toml --json scene.accepted.toml", "scene.accepted.toml"),
+        ("check a.gltf --json ./gltf_buffer_0.bin", "gltf_buffer_0.bin"),
+        ("check r.urdf --json a.stl", "a.stl"),
+        ("check /dev/null --json new.json", "unknown clamp or file '/dev/null'"),
+    ],
+)
+def test_no_file_is_written_over_what_the_input_names(command, victim, tmp_path, monkeypatch, main):
+    if "urdf" in command:
+        pytest.importorskip("yourdfpy")
+    monkeypatch.chdir(tmp_path)
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+    (tmp_path / "parts").mkdir()
+    for name in ("a.stl", "parts/b.stl"):
+        box.export(name)
+    for name, data in trimesh.exchange.gltf.export_gltf(trimesh.Scene(box)).items():
+        (tmp_path / name.replace("model", "a")).write_bytes(data)
+    (tmp_path / "scene.toml").write_text('include = "parts"\n[parts.a]\nfile = "a.stl"\n')
+    (tmp_path / "poses.csv").write_text("name,x,y,z,qx,qy,qz,qw\nb,0,0,0,0,0,0,1\n")
+    (tmp_path / "r.urdf").write_text(ROBOT)
+    (tmp_path / "scene.accepted.toml").write_text("")
+    assert main("check", "scene.toml", "--json", "last.json")[0] == 1
+    before = {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob("*")}
+    code, _, error = main(*command.split())
+    assert (code, error.count("\n"), victim in error) == (2, 1, True), error
+    assert {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob("*")} == before
