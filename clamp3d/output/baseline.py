@@ -7,19 +7,23 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
+import msgspec
 import numpy as np
 
 from clamp3d.engine.result import BAD, PairResult
 from clamp3d.engine.scene import Scene
+from clamp3d.engine.verdict import Verdict
 from clamp3d.errors import InputError
-from clamp3d.geometry.pose import Array, inverse
+from clamp3d.geometry.pose import Array, check_pose_array, inverse
+from clamp3d.geometry.primitives import LARGEST
 from clamp3d.output.groups import Accepted, Group
 from clamp3d.output.tables import csv_table
 
 Status = Literal["new", "changed", "same", "accepted"]
 Names = tuple[str, str]
+_Bound = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)] | None
 Key = tuple[str, str, str | None, bool]
 
 COLUMNS = ("id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method")
@@ -104,11 +108,47 @@ def _keys(pairs: Iterable[Sequence[str]], motion: str | None, verdict: str) -> l
     return [(*sorted(pair), motion, verdict in BAD) for pair in pairs]  # type: ignore[misc]
 
 
+class _Group(TypedDict):
+    id: str
+    a: str
+    b: str
+    verdict: Verdict
+    motion: str | None
+    count: int
+    at_least_mm: _Bound
+    at_most_mm: _Bound
+    pairs: list[Names]
+    status: NotRequired[str]
+    changed: NotRequired[list[Names]]
+
+
+class _Row(msgspec.Struct):
+    a: str
+    b: str
+    verdict: Verdict
+    at_least_mm: _Bound
+    at_most_mm: _Bound
+    motion: str | None = None
+
+
+class _Part(msgspec.Struct):
+    T_world: list[list[float]]
+
+
+class _Check(msgspec.Struct):
+    """What is compared of a result that ``check --json`` wrote."""
+
+    groups: list[_Group]
+    pairs: list[_Row]
+    motions: list[_Row]
+    parts: dict[str, _Part]
+
+
 @dataclass(frozen=True, slots=True)
 class Baseline:
     """An earlier check: its groups, verdict and bounds of its rows, and where its parts stood."""
 
-    groups: Sequence[tuple[Mapping[str, Any], list[Key]]]
+    groups: Sequence[tuple[_Group, list[Key]]]
     rows: Mapping[tuple[str | None, ...], tuple[str, float | None, float | None]]
     poses: Mapping[str, Array]
 
@@ -116,22 +156,18 @@ class Baseline:
     def read(cls, path: Path) -> Baseline:
         """From the JSON of a check. Raises InputError for a file that is none."""
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            groups = [(old, _keys(old["pairs"], old["motion"], old["verdict"])) for old in data["groups"]]
+            data = msgspec.convert(json.loads(path.read_text(encoding="utf-8")), _Check)
             rows = {
-                (*sorted((row["a"], row["b"])), row.get("motion")): (
-                    row["verdict"],
-                    row["at_least_mm"],
-                    row["at_most_mm"],
-                )
-                for row in (*data["pairs"], *data["motions"])
+                (*sorted((row.a, row.b)), row.motion): (row.verdict, row.at_least_mm, row.at_most_mm)
+                for row in (*data.pairs, *data.motions)
             }
-            poses = {name: np.array(part["T_world"], dtype=np.float64) for name, part in data["parts"].items()}
+            poses = check_pose_array([part.T_world for part in data.parts.values()]) if data.parts else ()
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, RecursionError):
             raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
-        return cls(groups, rows, poses)
+        groups = [(old, _keys(old["pairs"], old["motion"], old["verdict"])) for old in data.groups]
+        return cls(groups, rows, dict(zip(data.parts, poses, strict=True)))
 
     def differs(self, scene: Scene, row: PairResult) -> bool:
         """Whether the verdict of a pair, its distance or its parts' places to each other have changed."""

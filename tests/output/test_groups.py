@@ -3,10 +3,12 @@
 import csv
 import io
 import json
+import math
 import random
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from clamp3d import Motion, Scene, Verdict, check, shapes, view
@@ -177,11 +179,47 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
 
 
+BAD_BASELINES = [
+    (("parts", "a", "T_world"), [[1.0, 0.0], [0.0, 1.0]]),
+    (("parts", "a", "T_world"), [[0.0] * 4] * 4),
+    (("parts", "a", "T_world"), [[math.nan] * 4] * 4),
+    (("parts", "a", "T_world"), [[1.0, 0.0, 0.0, 1e300], *np.eye(4)[1:].tolist()]),
+    (("parts", "a", "T_world"), np.diag([1.0, 1.0, -1.0, 1.0]).tolist()),
+    (("parts", "a", "T_world"), None),
+    (("pairs", 0, "at_most_mm"), "far"),
+    (("pairs", 0, "at_least_mm"), math.nan),
+    (("pairs", 0, "verdict"), "fine"),
+    (("pairs", 0, "a"), None),
+    (("groups", 0, "pairs", 0), ["a"]),
+    (("groups", 0, "pairs", 0), ["a", None]),
+    (("groups", 0, "motion"), 3),
+    (("groups", 0, "motion"), {}),
+    (("groups", 0, "at_most_mm"), math.inf),
+    (("groups",), None),
+]
+
+
+@pytest.mark.parametrize(("place", "value"), BAD_BASELINES)
+def test_a_damaged_baseline_is_refused(place, value, tmp_path, main):
+    source, last = boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9}), tmp_path / "last.json"
+    assert main("check", source, "--json", last)[0] == 1
+    data = json.loads(last.read_text())
+    assert main("check", source, "--baseline", last)[0] == 0
+    table = data
+    for key in place[:-1]:
+        table = table[key]
+    table[place[-1]] = value
+    last.write_text(json.dumps(data))
+    wanted = f"clamp3d: error: {last}: not a result of `clamp3d check --json` with groups of findings\n"
+    assert main("check", source, "--baseline", last) == (2, "", wanted)
+
+
 @pytest.mark.parametrize(
     ("arguments", "files", "message"),
     [
         (("check", "boxes.toml", "--baseline", "none.json"), {}, "none.json: cannot be read: No such file"),
         (("check", "boxes.toml", "--baseline", "old.json"), {"old.json": "{}"}, "not a result of `clamp3d check --"),
+        (("check", "boxes.toml", "--baseline", "deep.json"), {"deep.json": "[" * 100_000}, "not a result of `clamp3d"),
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
         (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
         (("accept", "boxes.toml", "abcdefg1", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
