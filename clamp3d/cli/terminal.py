@@ -81,26 +81,24 @@ STDOUT_TAKEN = "clamp3d.stdout"
 
 def end_on_signals() -> None:
     """Let a process that is ended by a signal (SIGTERM, SIGHUP) remove its temporary files and its workers before."""
-
-    def end(number: int, frame: object) -> NoReturn:
-        raise SystemExit(128 + number)
-
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores SIGHUP
-            signal.signal(number, end)
+            signal.signal(number, _end)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+        signal.signal(signal.SIGINT, _end)
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """End at once while a module is imported, since some libraries ignore what is raised then."""
+def _end(number: int, frame: FrameType | None) -> NoReturn:
+    """End at once while a module is imported, since some libraries ignore what is raised then; workers end too."""
+    is_interrupt = number == signal.SIGINT
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
-            print("clamp3d: interrupted", file=sys.stderr, flush=True)
-            os._exit(ExitCode.INTERRUPTED)
+            if is_interrupt:
+                print("clamp3d: interrupted", file=sys.stderr, flush=True)
+            os._exit(128 + number)
         frame = frame.f_back
-    raise KeyboardInterrupt
+    raise KeyboardInterrupt if is_interrupt else SystemExit(128 + number)
 
 
 def prepare_streams() -> None:

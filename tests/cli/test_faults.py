@@ -15,8 +15,15 @@ from tests.cli.boxes import boxes
 COMMAND = [sys.executable, "-m", "clamp3d"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-INTERRUPTIBLE = PIPES | {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
-"""A background job without a terminal hands an ignored Ctrl-C down to its children."""
+
+
+def _heed_signals():
+    """A background job without a terminal hands an ignored Ctrl-C or end of the line down to its children."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+INTERRUPTIBLE = PIPES | {"preexec_fn": _heed_signals}
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and file names")
 
 
@@ -145,17 +152,19 @@ def alive(pid):
 
 
 @posix
-def test_an_interrupt_ends_the_program_also_while_a_library_that_ignores_it_is_imported(tmp_path):
+@pytest.mark.parametrize(("name", "said"), [("INT", b"clamp3d: interrupted\n"), ("TERM", b""), ("HUP", b"")])
+def test_a_signal_ends_the_program_also_while_a_library_that_ignores_it_is_imported(name, said, tmp_path):
+    number = getattr(signal, f"SIG{name}")
     (tmp_path / "stubborn.py").write_text(
-        "import time\nprint('here', flush=True)\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    pass\n"
+        "import time\ntry:\n    print('here', flush=True)\n    time.sleep(60)\nexcept BaseException:\n    pass\n"
     )
     code = "from clamp3d.cli.terminal import end_on_signals; end_on_signals(); import stubborn; print('went on')"
     env = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])}
     with subprocess.Popen([sys.executable, "-c", code], **INTERRUPTIBLE, env=env) as process:
         assert process.stdout.readline() == b"here\n"
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=60) == (b"", b"clamp3d: interrupted\n")
-    assert process.returncode == 130
+        process.send_signal(number)
+        assert process.communicate(timeout=60) == (b"", said)
+    assert process.returncode == 128 + number
 
 
 def test_no_file_is_written_over_what_is_read_or_over_another(tmp_path, monkeypatch, main):
