@@ -186,11 +186,13 @@ class Accepted:
 def accepted_file(source: str) -> Path:
     """The file with the accepted findings of an input: beside a file or folder, else in the current folder.
 
+    It is named after the file without its ending, and after the whole name of a folder.
+
     >>> accepted_file("parts/hinge.step").as_posix()
     'parts/hinge.accepted.toml'
     """
-    path = Path(source) if Path(source).name else Path(source).resolve()
-    return path.with_name(f"{path.stem}.accepted.toml")
+    path = Path(source) if Path(source).name not in ("", "..") else Path(source).resolve()
+    return path.with_name(f"{path.name if path.is_dir() else path.stem}.accepted.toml")
 
 
 def read_accepted(path: Path) -> dict[str, Accepted]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from clamp3d import Motion, Scene, Verdict, check, shapes, view
 from clamp3d.kernel import translation
@@ -177,6 +178,23 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 8})
     assert main("check", "boxes.toml")[0] == 1  # a and c clash too now
+
+
+def test_folders_whose_names_differ_after_a_point_do_not_share_what_is_accepted(tmp_path, monkeypatch, main):
+    for name in ("v1.2", "v1.3"):
+        (tmp_path / name).mkdir()
+        for part, x in (("a", 0.0), ("b", 9.0)):
+            box = trimesh.creation.box((10.0, 10.0, 10.0)).apply_translation((x, 0.0, 0.0))
+            box.export(tmp_path / name / f"{part}.stl")
+    monkeypatch.chdir(tmp_path / "v1.2")
+    identifier = re.search(r"id (\w{8})", main("check", ".")[1])[1]
+    for source in ("../v1.2", ".", "../v1.2/"):
+        assert main("accept", source, identifier, "--why", "so")[0] == 0
+    (tmp_path / "v1.3" / "sub").mkdir()
+    monkeypatch.chdir(tmp_path / "v1.3" / "sub")
+    assert main("accept", "..", "abcdefgh", "--why", "so")[0] == 0
+    assert {path.name for path in tmp_path.glob("*.toml")} == {"v1.2.accepted.toml", "v1.3.accepted.toml"}
+    assert [main("check", source)[0] for source in ("../../v1.2", "..")] == [0, 1]
 
 
 BAD_BASELINES = [
