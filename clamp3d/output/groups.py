@@ -12,7 +12,6 @@ import hashlib
 import json
 import math
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from clamp3d.checks import shown
+from clamp3d.clamp.loader import parse_toml
 from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
@@ -31,6 +33,7 @@ from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.pose import inverse
 from clamp3d.geometry.shapes import Shape, Solid
 from clamp3d.output.files import write_text
+from clamp3d.validation import validate
 
 _JUMP, _JUMP_SHARE = 0.01, 0.2
 """A distance that differs from the next by more mm than this, and by more than this share, has a cause of its own."""
@@ -173,14 +176,24 @@ def families(scene: Scene) -> dict[str, str]:
     return {name: kind[0] if count[kind] > 1 else name for name, kind in kinds.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class Accepted:
-    """A finding that somebody has accepted: its identifier, by whom, on what day, and why."""
+class Accepted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A finding that somebody has accepted: its identifier, why, by whom and on what day. Raises InputError."""
 
     id: str
+    why: str
     who: str = ""
     when: str = ""
-    why: str = ""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z2-7]{8}", self.id):
+            rule = "id of a finding must be 8 of a-z and 2-7, as check prints it at its end"
+            raise InputError(f"{rule}, got {shown(self.id)}")
+        if not self.why.strip():
+            raise InputError(f"why must not be empty, got {shown(self.why)}")
+
+
+class _AcceptedFile(msgspec.Struct, forbid_unknown_fields=True):
+    accepted: list[Accepted] = []
 
 
 def accepted_file(source: str) -> Path:
@@ -200,11 +213,14 @@ def read_accepted(path: Path) -> dict[str, Accepted]:
     if not path.is_file():
         return {}
     try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8")).get("accepted", [])
-        accepted = [Accepted(**{key: str(value) for key, value in entry.items()}) for entry in entries]
-    except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise InputError(f"{path}: must hold [[accepted]] with id, who, when and why: {error}") from None
-    return {entry.id: entry for entry in accepted}
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    data = msgspec.to_builtins(parse_toml(text, str(path)))  # a date of TOML becomes its text
+    file = validate(_AcceptedFile, data, f"{path}: must hold [[accepted]] with id, who, when and why")
+    return {entry.id: entry for entry in file.accepted}
 
 
 def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -> list[Accepted]:
@@ -215,13 +231,9 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
     if not why.strip():
         raise InputError(f"the reason (--why) must not be empty, got {why!r}")
     present = read_accepted(path)
-    for identifier in identifiers:
-        if not re.fullmatch(r"[a-z2-7]{8}", identifier):
-            raise InputError(
-                f"id of a finding must be 8 of a-z and 2-7, as check prints it at its end, got {identifier!r}"
-            )
-    new = [i for i in dict.fromkeys(identifiers) if i not in present]
-    entries = [Accepted(i, who or getpass.getuser(), date.today().isoformat(), why) for i in new]
+    who, when = who or getpass.getuser(), date.today().isoformat()
+    entries = [Accepted(i, why, who, when) for i in dict.fromkeys(identifiers)]
+    entries = [entry for entry in entries if entry.id not in present]
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     for entry in entries:
         keys = ("id", "who", "when", "why")  # TOML has no surrogate pairs, which ASCII alone would need

@@ -232,6 +232,22 @@ def test_a_damaged_baseline_is_refused(place, value, tmp_path, main):
     assert main("check", source, "--baseline", last) == (2, "", wanted)
 
 
+BAD_ACCEPTED = [
+    ("a = " + "[" * 3000 + "]" * 3000, "boxes.accepted.toml: not valid TOML: tables or arrays nested too deeply"),
+    (
+        '[[accept]]\nid = "abcdefgh"\nwhy = "so"',
+        "id, who, when and why: accept is not a known key; did you mean accepted?",
+    ),
+    ('accepted = ["abcdefgh"]', "why: accepted.0: must be a table, got 'abcdefgh'"),
+    ('[accepted]\nid = "abcdefgh"', "why: accepted: must be a list, got"),
+    ('[[accepted]]\nid = "abcdefgh"', "why: accepted.0.why is missing"),
+    ('[[accepted]]\nid = "abcdefgh"\nwhy = " "', "why: accepted.0.why must not be empty, got ' '"),
+    ('[[accepted]]\nid = "zzz"\nwhy = "so"', "why: accepted.0.id of a finding must be 8 of a-z and 2-7"),
+    ('[[accepted]]\nid = 5\nwhy = "so"', "why: accepted.0.id: must be a text, got 5"),
+    ('[[accepted]]\nid = "abcdefgh"\nwhy = "so"\nx = 1', "why: accepted.0.x is not a known key"),
+]
+
+
 @pytest.mark.parametrize(
     ("arguments", "files", "message"),
     [
@@ -239,6 +255,7 @@ def test_a_damaged_baseline_is_refused(place, value, tmp_path, main):
         (("check", "boxes.toml", "--baseline", "old.json"), {"old.json": "{}"}, "not a result of `clamp3d check --"),
         (("check", "boxes.toml", "--baseline", "deep.json"), {"deep.json": "[" * 100_000}, "not a result of `clamp3d"),
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
+        *((("check", "boxes.toml"), {"boxes.accepted.toml": text}, message) for text, message in BAD_ACCEPTED),
         (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
         (("accept", "boxes.toml", "abcdefg1", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
         (("accept", "boxs.toml", "abcdefgh", "--why", "so"), {}, "boxs.toml: no such file or folder"),
