@@ -235,6 +235,7 @@ def accept(path: Path, identifiers: Sequence[str], *, why: str, who: str = "") -
     entries = [Accepted(i, why, who, when) for i in dict.fromkeys(identifiers)]
     entries = [entry for entry in entries if entry.id not in present]
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    text += "" if text.endswith("\n") else "\n"  # an editor may have left the last line open
     for entry in entries:
         keys = ("id", "who", "when", "why")  # TOML has no surrogate pairs, which ASCII alone would need
         fields = (f"{key} = {json.dumps(getattr(entry, key), ensure_ascii=False)}\n" for key in keys)
