@@ -137,8 +137,16 @@ def part_name(name: str) -> str:
     >>> part_name(" M8 x 20, DIN 933:2 ")
     'M8-x-20-DIN-933-2'
     """
-    printable = "".join(c if c.isprintable() else " " for c in name)
-    return re.sub(r"[\s:,*?\[\]]+", "-", printable).strip("-") or "part"
+    return re.sub(r"[\s:,*?\[\]]+", "-", printable(name)).strip("-") or "part"
+
+
+def printable(text: str) -> str:
+    r"""A text that every file can hold: control characters and halves of characters become spaces.
+
+    >>> printable("a\x0bb\ud800")
+    'a b '
+    """
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def unique_names(names: Iterable[str]) -> list[str]:

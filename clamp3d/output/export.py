@@ -16,6 +16,7 @@ from clamp3d.clamp.result import Assembly
 from clamp3d.engine.result import BAD, CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.files.bodies import printable
 from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.open_cascade import moved, occ, volume_of
 from clamp3d.files.solid import BrepSolid
@@ -239,7 +240,7 @@ def _files(
     settings: dict[str, Any], file: Path | None, name: str, placed: Sequence[PlacedPart], meshed: Sequence[PosedMesh]
 ) -> dict[str, tuple[bytes, Sequence[str]]]:
     """Contents of each file by its name, and the parts in it."""
-    title = "".join(c if c.isprintable() else " " for c in name)
+    title = printable(name)
     files: dict[str, tuple[bytes, Sequence[str]]] = {}
     if settings["layout"] == "assembly":
         stem = file.stem if file else file_stem(name)

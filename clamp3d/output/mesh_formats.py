@@ -7,6 +7,7 @@ transform; STL, OBJ and PLY have no transforms, so the pose is in the coordinate
 from __future__ import annotations
 
 import ctypes
+import re
 import uuid
 from collections.abc import Sequence
 from typing import Any
@@ -58,7 +59,9 @@ def obj(items: Sequence[PosedMesh], title: str, unit: str, mtl_name: str) -> tup
     """Wavefront OBJ with one named object per part, and its MTL with the colours."""
     scene = trimesh.Scene()
     for item in items:
-        name = item.label.replace(" ", "_")
+        name = re.sub(r" |\\$", "_", item.label)  # a backslash would join the next line
+        while name in scene.geometry:  # of two with one name trimesh keeps one
+            name += "_"
         visual: Any = trimesh.visual
         material = visual.material.SimpleMaterial(name=name, diffuse=rgb(item.colour))
         mesh = _mesh(item, unit)

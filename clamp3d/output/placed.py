@@ -13,7 +13,7 @@ from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.parts import parts
 from clamp3d.engine.scene import Scene, unknown_part
 from clamp3d.errors import InputError
-from clamp3d.files.bodies import Component
+from clamp3d.files.bodies import Component, printable
 from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
@@ -52,9 +52,9 @@ class PlacedPart:
 
     @property
     def label(self) -> str:
-        """Name and title as files show it, e.g. ``P1 up splint``."""
+        """Name and title as files show it, e.g. ``P1 up splint``; printable."""
         title = getattr(self.shape, "title", "")
-        return f"{self.name} {title}" if title and self.shape.name == self.name else self.name
+        return printable(f"{self.name} {title}" if title and self.shape.name == self.name else self.name)
 
     @property
     def T(self) -> Array:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError, InputError
-from clamp3d.files.bodies import Component
+from clamp3d.files.bodies import Component, printable
 from clamp3d.files.open_cascade import explore, location, occ, parse
 from clamp3d.files.solid import BrepSolid, require_open_cascade
 from clamp3d.geometry.extrusion import Extrusion
@@ -123,7 +123,7 @@ def _top(component: Component) -> Component:
 def _named(label: Any, text: str) -> Any:
     """The label with a name."""
 
-    occ.TDataStd_Name.Set_s(label, occ.TCollection_ExtendedString(text, True))
+    occ.TDataStd_Name.Set_s(label, occ.TCollection_ExtendedString(printable(text), True))
     return label
 
 

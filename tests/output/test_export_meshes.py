@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import InputError, Scene, export, shapes
+from clamp3d import InputError, Scene, export, load, shapes
 from clamp3d.clamp.dimensions import PARTS, TITLES
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
@@ -191,6 +191,20 @@ def test_any_name_gives_readable_files(odd_scene, tmp_path):
         assert written.files[0].name == f"berklemme-5-a-next.{format}"
         loaded = trimesh.load(written.files[0])
         assert loaded.extents.max() > 0.1
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("names", [("a\x0bb", "c"), ("x\\", "y"), ("\ud800x", "y"), ("a_b", "a\x0bb", "a\x0cb")])
+def test_any_part_name_gives_files_with_all_parts(names, format, tmp_path):
+    if format in ("3mf", "step"):
+        pytest.importorskip({"3mf": "lib3mf", "step": "OCP"}[format])
+    scene = Scene(name="s\ud800")
+    for k, name in enumerate(names):
+        scene = scene.add(name, shapes.box((1, 2, 3)), translation(10.0 * k, 0.0, 0.0))
+    (file, *_) = export(scene, tmp_path, format=format, layout="assembly").files
+    read = load(file).parts
+    assert len(read) == (len(names) if format in ("glb", "3mf", "step") else 1)
+    assert format == "step" or sum(len(part.shape.mesh.faces) for part in read) == 12 * len(names)
 
 
 @pytest.mark.parametrize("name", ["world", "root", "P3"])
