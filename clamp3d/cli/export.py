@@ -15,6 +15,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
 from clamp3d.output.export import Format, Layout, default_layout, destination, export
+from clamp3d.output.files import check_folder
 
 
 @command("export")
@@ -52,6 +53,8 @@ class Export(Source, Quiet):
     def run(self) -> None:
         """Place the parts and write them."""
         form, file = destination(self.output, self.format)
+        if file is None:
+            check_folder(self.output)
         loaded = self.load()
         whole = file is not None or (self.layout or default_layout(form)) == "assembly"
         placed = isinstance(loaded, Clamp) and (whole or self.state is not None)

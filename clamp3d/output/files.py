@@ -73,7 +73,9 @@ def check_writable(path: Path) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError if ``folder`` neither exists nor can be created: to be called before long work."""
+    """Raise InputError if ``folder`` neither exists nor can be created, or is ``-``: to be called before long work."""
+    if folder == STDOUT:
+        raise InputError("cannot write into -: it is stdout, not a folder")
     nearest = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if os.path.lexists(parent))
     _probe(nearest, f"cannot write into {short(folder)}")
 

@@ -91,6 +91,8 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["report"], "--output"),
         (["report", "-q", "-o", "x", "--clearance", "-1"], "clearance"),
         (["report", "-q", "-o", "boxes.toml/x"], "boxes.toml"),
+        (["report", "boxes.toml", "-q", "-o", "-"], "cannot write into -: it is stdout, not a folder"),
+        (["export", "boxes.toml", "-q", "-f", "stl", "-o", "-"], "cannot write into -: it is stdout, not a folder"),
         (["report", "boxes.toml", "--method", "chords", "-o", "x"], "go with a clamp"),
         (["export", "-q", "-o", "x.stl", "--state", "P9"], "unknown state 'P9'; available: open, P1|P2P3P4P5 (or 1)"),
         *((["run", f"--step={text}"], NO_NUMBER) for text in ("1/0", "", "inf", "1,5", "1_0", "wide")),
