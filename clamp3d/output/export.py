@@ -257,7 +257,7 @@ def _stems(placed: Sequence[PlacedPart]) -> Iterator[str]:
     """File names of the parts, with a number where two would be the same."""
     taken: set[str] = set()
     for item in placed:
-        stem = file_stem(item.label)
+        stem = file_stem(item.label, "part")
         numbered = (stem if k == 1 else f"{stem}-{k}" for k in itertools.count(1))
         name = next(name for name in numbered if name.lower() not in taken)
         taken.add(name.lower())

@@ -117,10 +117,10 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
     return paths
 
 
-def file_stem(name: str) -> str:
-    """A clamp's name as a file name: letters, digits, point, dash and underscore.
+def file_stem(name: str, default: str = "clamp") -> str:
+    """A name as a file name: letters, digits, point, dash and underscore; ``default`` if it has none of them.
 
     >>> file_stem("JB-3 (left/right)")
     'JB-3-left-right'
     """
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "clamp"
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or default

@@ -193,6 +193,11 @@ def test_any_name_gives_readable_files(odd_scene, tmp_path):
         assert loaded.extents.max() > 0.1
 
 
+def test_parts_without_a_letter_for_a_file_name_are_numbered(tmp_path):
+    scene = Scene().add("夹", shapes.box((1, 2, 3))).add("线", shapes.box((1, 2, 3)))
+    assert [path.name for path in export(scene, tmp_path, format="stl").files] == ["part.stl", "part-2.stl"]
+
+
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("names", [("a\x0bb", "c"), ("x\\", "y"), ("\ud800x", "y"), ("a_b", "a\x0bb", "a\x0cb")])
 def test_any_part_name_gives_files_with_all_parts(names, format, tmp_path):
