@@ -24,6 +24,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.geometry.profile import check_mesh_error
 from clamp3d.output.files import write_text
 from clamp3d.output.pages import render
 from clamp3d.output.palette import FORCE, VERDICT_COLOURS
@@ -70,6 +71,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         mesh_error: float = 0.01,
         overlays: Mapping[str, Pieces] | None = None,
     ) -> None:
+        check_mesh_error(mesh_error)  # also where nothing is round
         self._source = shown if isinstance(shown, ClampStory) else Story(shown)
         self._server = server
         self._log = CommandLog(server if isinstance(server, MeshcatServer) else None)

@@ -85,6 +85,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["view", "--html", "x.html", "--open"], "--open"),
         (["view", "--html", "no/such/folder/x.html"], "no/such/folder"),
         (["view", "--draw-error", "-1", "--timeout", "0"], "mesh_error"),
+        (["view", "boxes.toml", "--draw-error", "-1", "--html", "x.html"], "mesh_error"),
         (["view", "--clearance", "-1", "--timeout", "0"], "clearance"),
         (["view", "bearing.stpe"], "; did you mean .stp?"),
         (["view", "--host", "203.0.113.7", "--timeout", "0"], "203.0.113.7"),
