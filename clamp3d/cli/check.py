@@ -38,9 +38,9 @@ def name_pairs(text: str) -> list[tuple[str, str]]:
 
 def allowed_rule(text: str) -> Allowed:
     """A rule about contacts that are meant, as the type of an option."""
-    rule, _, depth = text.partition("=")
+    rule, equals, depth = text.partition("=")
     a, colon, b = rule.partition(":")
-    overlap = number(depth) if depth else 0.0
+    overlap = number(depth) if equals else 0.0
     return Allowed(a, b, overlap) if colon else Allowed(overlap=overlap, relation=rule)
 
 

@@ -58,6 +58,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["rum"], "No such command 'rum'. Did you mean 'run'?"),
         (["boxes.toml"], "boxes.toml is no command; to check it: clamp3d check boxes.toml"),
         (["check", "boxes.toml", "--allow", "glue"], "must be one of running, press, thread, duplicate, got 'glue'"),
+        *((["check", "boxes.toml", "--allow", rule], f"{NO_NUMBER} ''") for rule in ("a:b=", "press=")),
         (["check", "boxes.toml", "--line", "LJ-500"], "line goes with a clamp"),
         (["check", "boxes.toml", "--pairs", "a"], "must read like P1:P6,P2:P7, got 'a'"),
         (["check", "boxes.toml", "--pairs", "a:leg"], "unknown part 'leg'; available: a, b"),
