@@ -29,8 +29,9 @@ Key = tuple[str, str, str | None, bool]
 COLUMNS = ("id", "status", "group", "a", "b", "verdict", "motion", "t", "at_least_mm", "at_most_mm", "method")
 _CHANGED, _CHANGED_SHARE = 1e-3, 1e-3
 """A distance has changed since the last check if it differs by more mm than this, or by more than this share."""
-_MOVED = 1e-6
-"""Mm (or, of a turn, parts) by which two poses differ if they are not the same pose, written and read again."""
+_MOVED = 1e-5
+"""Parts of a turn, and of a place in mm, by which two poses differ that are not one, written and read again: 3MF has
+six digits. A place farther off than `_CHANGED` has moved in any case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,10 +191,10 @@ class Baseline:
         # Where all moved alike, as one assembly, nothing has moved in it.
         common = way[max(alike.values(), key=len)[0]] if alike else np.eye(4)
         far = {part.name: math.inf for part in scene.parts if part.name not in way}
-        for name, T in way.items():
-            if not _same(T, common):
-                before = common @ self.poses[name]
-                far[name] = float(np.linalg.norm(_pose(scene, name)[:3, 3] - before[:3, 3]))
+        for name in way:
+            now, before = _pose(scene, name), common @ self.poses[name]
+            if not _same(now, before):
+                far[name] = float(np.linalg.norm(now[:3, 3] - before[:3, 3]))
         return far
 
 
@@ -202,7 +203,8 @@ def _pose(scene: Scene, name: str) -> Array:
 
 
 def _same(T: Array, other: Array) -> bool:
-    return bool(np.abs(T - other).max() <= _MOVED)
+    place = min(_CHANGED, _MOVED * max(1.0, float(np.abs(other[:3, 3]).max())))
+    return bool((np.abs(T - other) <= (_MOVED, _MOVED, _MOVED, place)).all())
 
 
 def groups_csv(groups: Sequence[Group], comparison: Comparison) -> str:

@@ -234,6 +234,23 @@ def test_a_damaged_baseline_is_refused(place, value, tmp_path, main):
     assert main("check", source, "--baseline", last) == (2, "", wanted)
 
 
+def test_a_3mf_is_the_same_as_the_scene_that_it_is_of(tmp_path, main):
+    """Its poses have six digits, which are no moves."""
+    pytest.importorskip("lib3mf")
+    source, last, made = boxes(tmp_path / "s.toml", {"a": 0, "b": 9}), tmp_path / "s.json", tmp_path / "s.3mf"
+    source.write_text(
+        source.read_text()
+        .replace("[0, 0, 0]", "[31.23456789, 62.3456789, 3], rpy_deg = [10, 20, 30]")
+        .replace("[9, 0, 0]", "[39.3456789, 62.1, 3.123456789], rpy_deg = [40, 20, 30]")
+    )
+    assert main("check", source, "--json", last)[0] == 1
+    assert main("export", source, "-o", made)[0] == 0
+    code, said, _ = main("check", made, "--baseline", last)
+    assert code == 0
+    assert "since the baseline: 0 new, 0 changed, 0 gone, 1 unchanged" in said
+    assert "moved" not in said
+
+
 BAD_ACCEPTED = [
     ("a = " + "[" * 3000 + "]" * 3000, "boxes.accepted.toml: not valid TOML: tables or arrays nested too deeply"),
     (
