@@ -9,8 +9,8 @@ from clamp3d.checks import note_read, short
 from clamp3d.clamp.loader import builtin_clamps
 from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import (
-    INPUT_FILE,
     JSON,
+    RESULT_FILE,
     SOURCE,
     Output,
     Quiet,
@@ -70,7 +70,7 @@ class Check(Source, Quiet):
     distances: bool = option("Measure every pair, not only as finely as its verdict needs, and depths with more work.")
     baseline: Path | None = option(
         "Compare with this result of an earlier check --json; then only new findings count for the exit code.",
-        type=INPUT_FILE,
+        type=RESULT_FILE,
         metavar="LAST.json",
     )
     json_file: Path | None = JSON

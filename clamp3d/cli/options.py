@@ -89,6 +89,8 @@ class Output(click.Path):
 SOURCE = click.Path(readable=False)
 """What `clamp3d.load` takes as a text: the shell completes it as a file."""
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
+RESULT_FILE = click.Path(dir_okay=False, path_type=Path)
+"""An earlier result, which the new one may replace."""
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
 

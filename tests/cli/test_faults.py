@@ -202,7 +202,6 @@ ROBOT = (
         ("export scene.toml -f stl -o .", "a.stl"),
         ("view scene.toml --html parts/b.stl", "b.stl"),
         ("check parts --poses poses.csv --json poses.csv", "poses.csv"),
-        ("check scene.toml --baseline last.json --json last.json", "last.json"),
         ("check scene.toml --json scene.accepted.toml", "scene.accepted.toml"),
         ("check a.gltf --json ./gltf_buffer_0.bin", "gltf_buffer_0.bin"),
         ("check r.urdf --json a.stl", "a.stl"),
