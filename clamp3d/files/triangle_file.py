@@ -1,4 +1,4 @@
-"""STL, OBJ, PLY and OFF files as one body, by trimesh, whose loaders take what is left of a file that was cut off.
+"""STL, PLY and OFF files as one body, by trimesh, whose loaders take what is left of a file that was cut off, and OBJ.
 
 So the faces that the file announces are counted here. This runs in the process for foreign files.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +47,10 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
     """Vertices (n, 3) and faces (m, 3), in the file's unit."""
     raw, kind = path.read_bytes(), path.suffix[1:].lower()
     if kind == "obj":
-        raw = _plain_obj(raw)
+        vertices, faces = _obj_arrays(raw)
+        if not len(faces):
+            raise InputError("no triangles in the file")
+        return vertices, faces
     announced = _ANNOUNCED[kind](raw)
     with np.errstate(all="ignore"):  # numbers that are none are refused by `make_mesh`
         try:
@@ -116,36 +120,38 @@ def _announced_stl(raw: bytes) -> int:
     return announced
 
 
-def _plain_obj(raw: bytes) -> bytes:
-    """The vertices and faces of an OBJ file alone, each corner the number of its vertex from the start of the file.
+def _obj_arrays(raw: bytes) -> tuple[Array, IntArray]:
+    """Vertices (n, 3) and faces (m, 3) of an OBJ file, those with more corners as fans from the first one.
 
-    trimesh takes numbers < 0, which count back from their line, from the end of the file, and passes over what it does
-    not know. Raises InputError for such lines.
+    trimesh takes numbers < 0, which count back from their line, from the end of the file, and passes over lines that it
+    does not know. Raises InputError for these.
     """
-    vertices, faces = [], []
-    text = re.sub(rb"#[^\r\n]*", b"", raw.removeprefix(codecs.BOM_UTF8))
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    text, count = re.sub(rb"#[^\r\n]*", b"", raw.removeprefix(codecs.BOM_UTF8)), 0
     for line in re.sub(rb"\\(\r\n|\r|\n)", b" ", text).splitlines():
         keyword, *words = line.split() or [b"o"]
         if keyword == b"v":
-            if len([float(word) for word in words[:3]]) < 3:
+            vertices.append([float(word) for word in words[:3]])
+            if len(words) < 3:
                 raise InputError(f"the file is damaged: a vertex has {len(words)} coordinates")
-            vertices.append(b"v " + b" ".join(words[:3]))
         elif keyword == b"f":
             if len(words) < 3:
                 raise InputError(f"the file is damaged: a face has {len(words)} corners")
-            if b"/" in line:  # numbers of texture and normals follow
-                words = [word.partition(b"/")[0] for word in words]
-            corners = [int(word) for word in words]
-            if min(corners) <= 0:
-                corners = [k + len(vertices) + 1 if k < 0 else k for k in corners]
-                words = [b"%d" % k for k in corners]
+            corners = [int(word.partition(b"/")[0]) for word in words]  # numbers of texture and normals may follow
+            if min(corners) < 0:
+                corners = [k if k >= 0 else len(vertices) + 1 + k for k in corners]
             if min(corners) <= 0:
                 raise InputError(f"the file is damaged: {shown(str(line, 'latin-1'))} names no vertex before it")
-            faces.append(b"f " + b" ".join(words))
+            faces += [[corners[0], *side] for side in itertools.pairwise(corners[1:])]
+            count += 1
         elif keyword not in _OBJ_WITHOUT_FACES:
             word = shown(str(keyword, "latin-1"))
             raise InputError(f"a line begins with {word}, which is not read: export it as triangles")
-    return b"\n".join(vertices + faces)
+    V, F = np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3) - 1
+    if len(F) > count and F.max() < len(V):
+        _require_no_folds(V, F)
+    return V, F
 
 
 _OBJ_WITHOUT_FACES = frozenset(
@@ -153,10 +159,6 @@ _OBJ_WITHOUT_FACES = frozenset(
     b"cstype deg bmat step curv curv2 parm trim hole scrv sp end con csh".split()
 )
 """Lines of OBJ files that make no faces: all of the specification but those of free-form surfaces and other files."""
-
-
-def _announced_obj(raw: bytes) -> int:
-    return len(re.findall(rb"(?m)^f", raw))
 
 
 def _announced_ply(raw: bytes) -> int:
@@ -193,5 +195,5 @@ def _lines(data: bytes, count: int) -> list[bytes]:
     return lines
 
 
-_ANNOUNCED = {"stl": _announced_stl, "obj": _announced_obj, "ply": _announced_ply, "off": _announced_off}
+_ANNOUNCED = {"stl": _announced_stl, "ply": _announced_ply, "off": _announced_off}
 """How many faces a file of each format says that it has."""
