@@ -345,3 +345,14 @@ def test_the_depth_and_the_volume_of_a_bar_pressed_into_a_v_are_known_closely(ki
     segment = radius**2 * math.acos(1.0 - deep / radius) - (radius - deep) * math.sqrt((2.0 * radius - deep) * deep)
     low, high = row.where.volume
     assert low <= 2.0 * length * segment <= high <= 1.2 * low
+
+
+def test_of_a_drawn_groove_a_point_on_its_arc_is_nearest_to_a_mesh():
+    """Not one on the facets within it, which are 7e-6 mm and more away from it."""
+    legs = [trimesh.creation.box((4, 4, 6)), trimesh.creation.box((2, 2, 6)).apply_translation((0, 3, 0))]
+    tee = trimesh.boolean.union(legs, engine="manifold")
+    block = shapes.groove_block(shapes.SweptArc(12.0, 1.2, 50.0), 40.0, 20.0)
+    for T in (translation(0.0, -9.0, 0.0), translation(1.0, -8.0, 3.0)):
+        found = distance(block, tee, T)
+        assert np.hypot(*found.point_a[:2]) == pytest.approx(12.0, abs=1e-7)
+        assert found.upper == pytest.approx(np.linalg.norm(found.point_b - found.point_a), abs=1e-7)
