@@ -110,6 +110,8 @@ def test_a_pin_of_cad_passes_its_hole(plate_and_pin, aside):
     start = translation(aside, 0, 0) @ pin.T_world
     least = min_clearance(plate.shape, pin.shape, down(20.0), start)
     assert least.distance.lower - 1e-9 <= 0.1 - aside <= least.distance.upper + 1e-9
+    assert least.distance.upper - least.distance.lower < 1e-5  # its faces name the hole: the kernel measures it
+    assert least.distance.method == "groove kernel"
     assert not least.touches
 
 
