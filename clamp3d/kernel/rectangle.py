@@ -86,7 +86,8 @@ class HoleContact:
         Row of Table 2.
     gap_left, gap_right : float
         Least signed gap on either side in mm, positive apart, taken square to the flat that is met: the bolt's side
-        for a corner of the hole, the hole's wall for a corner of the bolt. Infinite for a bolt outside the hole.
+        for a corner of the hole, the hole's wall for a corner of the bolt, or its end for one beyond it. Infinite for a
+        bolt outside the hole.
     points : tuple of (float, float)
         The points (x, y) that touch.
     point, normal : (float, float)
@@ -186,5 +187,10 @@ def _side(hole: Rectangle, bolt: Rectangle, turn: float, side: int) -> list[_Fac
             along = (height - cy + side * hole.half_width * s) / c
             gap, (nx, ny) = (level + side * along * s) * c, hole.axis(-side)
             x, y = bolt.point(side * bolt.half_width, height)
+            foot = (x - hole.x) * math.sin(hole.angle) + (y - hole.y) * math.cos(hole.angle)
+            if gap > 0.0 and abs(foot) > hole.half_height:  # it is beyond the wall's end: that is nearest
+                end = hole.point(side * hole.half_width, math.copysign(hole.half_height, foot))
+                gap = math.dist(end, (x, y))
+                nx, ny = (x - end[0]) / gap, (y - end[1]) / gap
             ends.append(_Facing(gap, (x - gap * nx, y - gap * ny), (nx, ny)))
     return ends

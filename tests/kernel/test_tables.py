@@ -6,7 +6,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
@@ -234,6 +234,7 @@ HEIGHTS = {
     b=st.floats(3.0, 10.0),
     ends=st.sampled_from([*HEIGHTS]),
 )
+@example(x=0.0, y=2.0, w=12.0, turn=0.25, lean=0.0, b=3.0, ends="bolt ends at a corner")  # beyond the wall's end
 def test_gaps_against_polygons(x: float, y: float, w: float, turn: float, lean: float, b: float, ends: str) -> None:
     """Drawn back from the wall by its own gap and 1 mm, the bolt stands 1 mm from it: depth and distance alike."""
     hole_height, bolt_height = HEIGHTS[ends]
