@@ -80,6 +80,11 @@ def test_broad_phase_against_brute_force():
     assert sorted(near_pairs(Boxes.of(bounds, T), 2.0).tolist()) == near.tolist()
 
 
+def test_a_part_without_a_pose_is_no_part_of_a_scene():
+    with pytest.raises(InputError, match=r"part 'a' must be a pair \(shape, T_world\), got"):
+        Scene.of({"a": BOX})
+
+
 def test_brackets_in_names_stand_for_themselves():
     """Two pins that a pattern of shells would take for one another, both 0.5 mm in a plate."""
     pin = shapes.box((10, 10, 10))
