@@ -100,6 +100,11 @@ def _read(path: Path) -> tuple[str, str]:
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file, a byte order mark left out. Raises InputError if it cannot be read or is no text."""
     checks.readable_file(path, _MOST_BYTES)
+    return text_of(path)
+
+
+def text_of(path: Path) -> str:
+    """The same of a file that may be written over, as one that is kept up to date is. Raises InputError."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:

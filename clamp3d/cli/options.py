@@ -89,6 +89,7 @@ class Output(click.Path):
 SOURCE = click.Path(readable=False)
 """What `clamp3d.load` takes as a text: the shell completes it as a file."""
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
+"""A file that is read, over which nothing is written."""
 RESULT_FILE = click.Path(dir_okay=False, path_type=Path)
 """An earlier result, which the new one may replace."""
 PICTURE = Output((".png", ".svg", ".pdf"))
@@ -144,7 +145,7 @@ def command(name: str) -> Callable[[type[Any]], click.Command]:
             vars(instance).update(values)
             with files_read():
                 note_read(_inputs(parameters, values))
-                check_outputs(parameters.values(), values)
+                _check_outputs(parameters.values(), values)
                 instance.run()
 
         return click.Command(name, params=[*parameters.values()], callback=call, help=inspect.getdoc(kind))
@@ -163,7 +164,7 @@ def _inputs(parameters: Mapping[str, click.Parameter], values: Mapping[str, Any]
             yield from [f for f in path.iterdir() if f.suffix.lower() in FORMATS] if path.is_dir() else [path]
 
 
-def check_outputs(parameters: Iterable[click.Parameter], values: Mapping[str, Any]) -> None:
+def _check_outputs(parameters: Iterable[click.Parameter], values: Mapping[str, Any]) -> None:
     """Refuse that a file is written over another one, or over one that was read."""
     from clamp3d.output.files import STDOUT, require_not_read
 
@@ -254,7 +255,7 @@ class Source(ClampSource):
 
         loaded = load(**{key: getattr(self, key) for key in (*ClampSource.__annotations__, *Source.__annotations__)})
         context = click.get_current_context()
-        check_outputs(context.command.params, context.params)  # again: now it is known what INPUT names
+        _check_outputs(context.command.params, context.params)  # again: now it is known what INPUT names
         return loaded
 
 

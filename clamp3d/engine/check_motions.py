@@ -60,7 +60,7 @@ def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, 
         pair = MovingPair(models[i], models[j], motion, poses[i], poses[j])
         least, t = pair.least_distance(thresholds, allowance)
         meets = least.upper <= thresholds.contact + RESOLUTION  # as the verdict counts it
-        first = pair.first_time(thresholds.contact + RESOLUTION) if meets else None
+        first = pair.first_time(thresholds.contact + RESOLUTION, t) if meets else None
     except MissingLibraryError:
         raise
     except Exception as error:  # one pair that fails is a finding, not the end of all others
@@ -74,8 +74,7 @@ def _row(scene: Scene, models: list[Model], poses: list[Array], motion: Motion, 
     if verdict in BAD:
         distance = replace(distance.of_overlap(), interference=None)  # at another time they may be deeper
     T = motion.at(t, poses[i])
-    contact_at, contact_by = (None, None) if first is None else (first.t, max(first.t, min(first.by, t)))
-    row = PairResult(a, b, verdict, distance.moved(T), motion.name, t, contact_at, contact_by)
+    row = PairResult(a, b, verdict, distance.moved(T), motion.name, t, *(first or (None, None)))
     if verdict in BAD:
         return replace(row, locator=Locator(pair.a, pair.b, T, pair.pose(t)))
     if verdict is Verdict.UNCERTAIN:

@@ -107,8 +107,8 @@ def first_contact(
     pair = _moving_pair(a, b, motion, T_a_b, resolution)
     if margin < 0.0 and not isinstance(pair, MovingInGroove):
         raise InputError(f"margin must be >= 0 but for a groove and a cylinder, got {margin:g}")
-    found = pair.first_time(margin)
-    first = None if found is None else pair.reached(found.t, margin)
+    contact = pair.first_time(margin)
+    first = None if contact is None else pair.reached(contact.t, margin)
     if first is not None:
         here = pair.at(first, measured)
         if here.upper <= margin + RESOLUTION:

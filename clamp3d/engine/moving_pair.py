@@ -149,9 +149,12 @@ class MovingPair:
         """Width (mm) of a distance that is known for a search to within ``accuracy`` mm."""
         return max(self._known, 0.5 * accuracy)
 
-    def first_time(self, level: float) -> First | None:
-        """When they first come within ``level`` mm; None if all of the way is proven to be further apart."""
-        by, touching = np.inf, level + self.accuracy + self._width(self.accuracy)
+    def first_time(self, level: float, seen: float = np.inf) -> First | None:
+        """When they first come within ``level`` mm; None if all of the way is proven to be further apart.
+
+        ``seen``: a time at which they are known to be so near.
+        """
+        by, touching = seen, level + self.accuracy + self._width(self.accuracy)
 
         def distance(t: float, way: float) -> tuple[float, float]:
             nonlocal by

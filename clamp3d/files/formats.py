@@ -64,6 +64,7 @@ _ROBOT = Format("urdf_file:read_urdf", "stated", "yourdfpy")
 
 def read(path: Path, option: Any = None) -> Reading:
     """The bodies of a file, read in this process; ``option`` is one of `UNITS_MM`, or the joints of a robot."""
+    checks.note_read([path])
     kind = path.suffix.lower()
     form = _ROBOT if kind == ROBOT else FORMATS[kind]
     if form.library is not None:

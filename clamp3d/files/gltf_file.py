@@ -42,12 +42,12 @@ _HARMLESS = (
 _INSTANCES = "EXT_mesh_gpu_instancing"
 """The extension that places a node's mesh many times, which files may use without requiring it."""
 _KEYS = {
-    "nodes": "camera children skin matrix mesh rotation scale translation weights",
-    "accessors": "bufferView byteOffset componentType normalized count type max min sparse",
-    "bufferViews": "buffer byteOffset byteLength byteStride target",
-    "primitives": "attributes indices material mode targets",
+    "nodes": "camera children skin matrix mesh rotation scale translation weights name extensions extras",
+    "accessors": "bufferView byteOffset componentType normalized count type max min sparse name extensions extras",
+    "bufferViews": "buffer byteOffset byteLength byteStride target name extensions extras",
+    "primitives": "attributes indices material mode targets name extensions extras",
 }
-"""What glTF 2.0 allows in those besides names, extensions and extras: a misspelt place is none to trimesh."""
+"""What glTF 2.0 allows in those: a misspelt place is none to trimesh."""
 _TRIANGLES, _STRIP = 4, 5
 _NORMALIZED = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a whole number is divided by where an accessor says "normalized"."""
@@ -123,11 +123,12 @@ def _beside(path: Path, name: str) -> bytes:
 
 
 def _check_keys(tree: dict[str, Any]) -> None:
+    """Raise InputError for keys that trimesh would pass over."""
     primitives = [primitive for mesh in tree.get("meshes", []) for primitive in mesh["primitives"]]
     for kind, keys in _KEYS.items():
-        for item in primitives if kind == "primitives" else tree.get(kind, []):
-            for key in item:
-                choice(f"a key of {kind}", key, [*keys.split(), "name", "extensions", "extras"])
+        items = primitives if kind == "primitives" else tree.get(kind, [])
+        for key in dict.fromkeys(key for item in items for key in item):
+            choice(f"a key of {kind}", key, keys.split())
 
 
 def _nodes(tree: dict[str, Any]) -> list[int]:

@@ -26,8 +26,13 @@ from clamp3d.geometry.shapes import MeshShape
 
 _FOLDED = 1e-6
 """1 less the cosine of the angle (0.08 deg) to which two faces that share an edge are one on the other."""
-
 _MIXED = "the file is cut off, or its faces have different numbers of corners: export it as triangles"
+"""What trimesh cannot tell apart in binary PLY files."""
+_OBJ_WITHOUT_FACES = frozenset(
+    b"vt vn vp l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech stech "
+    b"cstype deg bmat step curv curv2 parm trim hole scrv sp end con csh".split()
+)
+"""Lines of OBJ files that make no faces: all of the specification but those of free-form surfaces and other files."""
 
 
 def read_triangles(path: Path, unit: str | None) -> Reading:
@@ -128,7 +133,8 @@ def _obj_arrays(raw: bytes) -> tuple[Array, IntArray]:
     """
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
-    text, count = re.sub(rb"#[^\r\n]*", b"", raw.removeprefix(codecs.BOM_UTF8)), 0
+    count = 0
+    text = re.sub(rb"#[^\r\n]*", b"", raw.removeprefix(codecs.BOM_UTF8))
     for line in re.sub(rb"\\(\r\n|\r|\n)", b" ", text).splitlines():
         keyword, *words = line.split() or [b"o"]
         if keyword == b"v":
@@ -152,13 +158,6 @@ def _obj_arrays(raw: bytes) -> tuple[Array, IntArray]:
     if len(F) > count and F.max() < len(V):
         _require_no_folds(V, F)
     return V, F
-
-
-_OBJ_WITHOUT_FACES = frozenset(
-    b"vt vn vp l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech stech "
-    b"cstype deg bmat step curv curv2 parm trim hole scrv sp end con csh".split()
-)
-"""Lines of OBJ files that make no faces: all of the specification but those of free-form surfaces and other files."""
 
 
 def _announced_ply(raw: bytes) -> int:

@@ -122,7 +122,6 @@ def _mesh_file(path: Path, name: str) -> Path:
         files = [(folder / part, folder) for folder in path.resolve().parents for part in inner]
     for file, folder in files:
         if may_read(file, folder) and file.is_file():
-            checks.note_read([file])
             return file
     raise InputError(f"no such file in the robot's folder, the one above or its package; {OUTSIDE}=1 allows others")
 

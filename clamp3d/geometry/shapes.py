@@ -14,12 +14,12 @@ from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from clamp3d.checks import array, choice, instance, items, number, text
 from clamp3d.errors import InputError
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.mesh import Mesh, make_mesh
+from clamp3d.geometry.mesh import IntArray, Mesh, make_mesh
 from clamp3d.geometry.pose import Array, norm
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc, place
 from clamp3d.geometry.primitives import size as _size
@@ -301,7 +301,7 @@ def sphere(radius: float, *, mesh_error: float | None = None, name: str = "spher
 
 
 @lru_cache(maxsize=9)
-def _unit_ball(subdivisions: int) -> tuple[Array, NDArray[np.int64], float]:
+def _unit_ball(subdivisions: int) -> tuple[Array, IntArray, float]:
     """Corners (n, 3) and triangles (m, 3) of an icosahedron in the unit sphere, subdivided, and how far it is below."""
     import trimesh
 

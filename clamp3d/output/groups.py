@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from clamp3d.checks import shown
-from clamp3d.clamp.loader import parse_toml
+from clamp3d.clamp.loader import parse_toml, text_of
 from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
@@ -212,13 +212,7 @@ def read_accepted(path: Path) -> dict[str, Accepted]:
     """The accepted findings by their identifiers; none where there is no file. Raises InputError for a bad file."""
     if not path.is_file():
         return {}
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file in UTF-8") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    data = msgspec.to_builtins(parse_toml(text, str(path)))  # a date of TOML becomes its text
+    data = msgspec.to_builtins(parse_toml(text_of(path), str(path)))  # a date of TOML becomes its text
     file = validate(_AcceptedFile, data, f"{path}: must hold [[accepted]] with id, who, when and why")
     return {entry.id: entry for entry in file.accepted}
 
