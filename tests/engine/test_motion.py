@@ -201,13 +201,14 @@ def test_a_bare_groove_meets_any_shape_in_either_order():
     assert latest - 1e-4 < block.t <= latest  # by meshes of the groove
 
 
-@pytest.mark.parametrize("budget", [5000, 20, 8])
-def test_a_first_contact_that_is_not_certain_is_printed_from_when_to_when_it_may_be(monkeypatch, budget):
+@pytest.mark.parametrize(("budget", "start"), [(5000, 20.0), (20, 20.0), (8, 20.0), (3, 12.0)])
+def test_a_first_contact_that_is_not_certain_is_printed_from_when_to_when_it_may_be(monkeypatch, budget, start):
+    """The last search ends before it sees a contact: one is known from the least distance."""
     monkeypatch.setattr(moving_pair, "BUDGET", budget)
-    scene = Scene().add("post", shapes.cylinder(4, 60)).add("ball", shapes.sphere(3.0), translation(-20, 6.9, 5))
+    scene = Scene().add("post", shapes.cylinder(4, 60)).add("ball", shapes.sphere(3.0), translation(-start, 6.9, 5))
     result = check(scene.with_motion(Motion.translate((40, 0, 0), parts="ball", name="past")))
     (row,) = result.motions
-    truth = (20.0 - math.sqrt(7.01**2 - 6.9**2)) / 40.0
+    truth = (start - math.sqrt(7.01**2 - 6.9**2)) / 40.0
     is_sharp = budget == 5000
     assert row.contact_at - 1e-7 <= truth <= row.contact_by + 1e-6
     assert (row.contact_by - row.contact_at < 1e-6) == is_sharp
