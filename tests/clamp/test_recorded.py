@@ -18,6 +18,9 @@ TOLERANCE = 2e-6
 """Processors may differ by that, and the records are rounded to six digits."""
 NOT_RECORDED = {"clamp3d", "work", "weakest", "residuals", "error_bound_mm", "unbalanced", "states_beyond", "depth_mm"}
 """Version, counts of work, and what is mostly rounding or one of many equal answers."""
+PLACED = {"level", "travel_mm", "measured"}
+"""Keys of a contact, of an event and of a difference from the matrix: each has a place, unique only where it says so."""
+PLACES = {"point", "point_a", "point_b", "normal", "direction"}
 OTHER_CLAMP = {
     'name = "reference"': 'name = "other"',
     "thickness = 27.7260": "thickness = 29.1",
@@ -60,8 +63,7 @@ def recorded(value):
         return [recorded(item) for item in value]
     if not isinstance(value, dict):
         return round(value, 6) if isinstance(value, float) else value
-    is_unique = "level" not in value or value["unique"] is True
-    places = set() if is_unique else {"point", "point_a", "point_b", "normal"}
+    places = set() if value.get("unique", not PLACED & set(value)) is True else PLACES
     return {key: recorded(item) for key, item in value.items() if key not in NOT_RECORDED | places}
 
 
