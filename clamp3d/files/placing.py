@@ -37,7 +37,7 @@ class Placer(Reading):
         if own not in self._shapes:
             self._shapes[own] = self._shape(name, arrays, form)
         place = np.eye(4)
-        place[:3, :3] = self.R @ pose[:3, :3] @ self.R.T
+        place[:3, :3] = self.R @ pose[:3, :3]
         place[:3, 3] = self.scale * self.R @ pose[:3, 3]
         self.add(name, self._shapes[own], place)
 
@@ -46,7 +46,7 @@ class Placer(Reading):
             V, F = arrays()
             if np.linalg.det(form) < 0.0:
                 F = F[:, ::-1]
-            mesh = make_mesh(V @ (self.R @ form).T, F, name=name, scale=self.scale, float32=True)
+            mesh = make_mesh(V @ form.T, F, name=name, scale=self.scale, float32=True)
             shape = MeshShape(mesh, "off", name)
         except InputError as error:
             return str(error).removeprefix(f"{name}: ")

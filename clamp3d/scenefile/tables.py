@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -17,8 +18,10 @@ from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
+from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry import shapes
 from clamp3d.geometry.motion import Motion
+from clamp3d.geometry.pose import to_target
 from clamp3d.geometry.primitives import SweptArc
 from clamp3d.scenefile.pose_table import Angle, Number, Pose, Table, Vector
 from clamp3d.scenefile.read_parts import Reader, names_like, read_parts
@@ -152,7 +155,7 @@ class FileTable(PartTable, kw_only=True):
 
 
 class MeshTable(FileTable, kw_only=True):
-    """``shape = "mesh"``: a file of one body, in its own frame; see `MeshShape` for ``fit``."""
+    """``shape = "mesh"``: a file of one body, in the file's frame in mm with Z up; see `MeshShape` for ``fit``."""
 
     def read(self, folder: Path) -> Scene:
         """The part, not yet moved or renamed."""
@@ -161,9 +164,13 @@ class MeshTable(FileTable, kw_only=True):
             raise InputError(
                 f"{self.file} holds {len(scene.parts)} bodies: leave out shape, and it gives as many parts"
             )
-        if not np.array_equal(scene.parts[0].T_world, np.eye(4)):
+        (part,) = scene.parts
+        if np.array_equal(part.T_world, np.eye(4)):
+            return scene
+        if not isinstance(part.shape, shapes.MeshShape) or isinstance(part.shape, BrepSolid):
             raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
-        return scene
+        mesh = replace(part.shape.mesh, vertices=to_target(part.T_world, part.shape.mesh.vertices))
+        return replace(scene, parts=(replace(part, shape=replace(part.shape, mesh=mesh), T_world=np.eye(4)),))
 
 
 AnyTable: TypeAlias = CylinderTable | BoxTable | SphereTable | GrooveBlockTable | ClampPartTable | FileTable

@@ -19,7 +19,7 @@ TOLERANCE = 2e-6
 NOT_RECORDED = {"clamp3d", "work", "weakest", "residuals", "error_bound_mm", "unbalanced", "states_beyond", "depth_mm"}
 """Version, counts of work, and what is mostly rounding or one of many equal answers."""
 PLACED = {"level", "travel_mm", "measured"}
-"""Keys of a contact, of an event and of a difference from the matrix: each has a place, unique only where it says so."""
+"""Keys of a contact, an event, and a difference from the matrix: their places are unique only where they say so."""
 PLACES = {"point", "point_a", "point_b", "normal", "direction"}
 OTHER_CLAMP = {
     'name = "reference"': 'name = "other"',

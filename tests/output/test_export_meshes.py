@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import InputError, Scene, export, load, shapes
+from clamp3d import InputError, Part, Scene, export, load, shapes
 from clamp3d.clamp.dimensions import PARTS, TITLES
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.scene import clamp_scene
@@ -74,6 +74,25 @@ def test_every_format_is_read_back_in_its_place(reference, odd_poses, odd_scene,
             assert f"unit {unit}".encode() in text
         if format == "ply":
             assert (np.asarray(solid.visual.vertex_colors)[:, :3] == COLOURS[name]).all()
+
+
+@pytest.mark.parametrize("format", ["glb", "3mf"])
+def test_poses_are_read_back_as_they_were(odd_poses, odd_scene, tmp_path, format):
+    (path,) = export(odd_scene, tmp_path / f"all.{format}").files
+    read = load(path).parts
+    assert len(read) == len(odd_poses)
+    for part, T in zip(read, odd_poses.values(), strict=True):
+        np.testing.assert_allclose(part.T_world, T, rtol=1e-5, atol=1e-5)
+
+
+def test_a_mesh_of_one_part_stands_in_the_frame_of_its_file(tmp_path):
+    part = Part("box", shapes.box((1.0, 2.0, 3.0)), translation(10.0, 20.0, 30.0))
+    export(Scene((part,)), tmp_path / "box.glb")
+    (tmp_path / "cell.toml").write_text('[parts.box]\nshape = "mesh"\nfile = "box.glb"\n', encoding="utf-8")
+    (read,) = load(tmp_path / "cell.toml").parts
+    assert read.T_world.tolist() == np.eye(4).tolist()
+    np.testing.assert_allclose(read.shape.mesh.vertices.min(axis=0), [9.5, 19.0, 28.5], atol=1e-5)
+    np.testing.assert_allclose(read.shape.mesh.vertices.max(axis=0), [10.5, 21.0, 31.5], atol=1e-5)
 
 
 def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
