@@ -15,21 +15,15 @@ from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
-from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
-from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Forms, Model
+from clamp3d.engine.mesh_distance import meshes_distance
+from clamp3d.engine.model import Forms, Model
 from clamp3d.engine.open_mesh import open_distance
-from clamp3d.errors import Clamp3dError, SolverError
+from clamp3d.errors import SolverError
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, inverse
 
 ACCURACY = 1e-7
 """Width (mm) of the interval at which a distance counts as known; relative to the size where that is more."""
-
-_COINCIDENT = 1e-4
-"""Overlap (mm) beyond which there is a common part to ask for; up to it faces coincide, which meshes prove."""
-
-_OPEN = 1.02
-"""Ratio of a bound that decides nothing to the closest that it can be at which it is sharpened no further."""
 
 
 def from_boxes(a: Model, b: Model, T: Array) -> Distance:
@@ -77,77 +71,13 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
         if _is_round(a) and not b.bracketed and b.chords:
             yield "facets", rods_distance(b.outer(b.chords[-1]), a.bodies or (), inverse(T)).moved(T).swapped()
     if a.exact is not None and b.exact is not None:
-        yield from _levels_of_cad(a, b, T, enough, cad_forms)
+        from clamp3d.engine.cad_pair import CadPair
+
+        closed_forms = iter(()) if cad_forms else _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+        yield from CadPair(a, b, T, enough).levels(closed_forms)
         return
     for chord in _chords(a, b):
         yield "meshes", meshes_distance(a, b, T, chord, enough)
-
-
-def _levels_of_cad(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> Iterator[tuple[str, Distance]]:
-    """What meshes and Open CASCADE say of two solids from CAD: coarse meshes, points, and then what takes longer."""
-    from clamp3d.engine.exact import exact_distance, exact_probe
-
-    chords = [chord for chord in a.chords if chord in b.chords]
-    for chord in chords[:1]:
-        yield "meshes", _by_meshes(a, b, T, chord, enough)
-    probe = exact_probe(a, b, T)
-    yield "exact", probe
-    attested, finer = -probe.upper, chords[1:]
-    is_small = bool(finer) and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
-    distance = exact_distance(a, b, T)
-    unproven = replace(distance, lower=-np.inf)
-    # A point that lies in both solids contradicts what Open CASCADE says of them now and then.
-    distance = unproven if distance.lower > probe.upper else distance
-    # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
-    is_doubtful = bool(chords) and np.isfinite(distance.lower) and (a.is_free_form or b.is_free_form)
-    yield "exact", unproven if is_doubtful else distance
-    if is_doubtful or (attested <= _COINCIDENT and is_small):
-        meshes = _by_meshes(a, b, T, finer.pop() if is_small else max(a.fine_chord, b.fine_chord), enough)
-        yield "meshes", meshes
-        if is_doubtful and distance.lower <= meshes.upper:
-            yield "exact", distance
-    is_found = False
-    for overlap in _common_parts(a, b, T, enough, attested, quick=True):
-        yield "exact", overlap
-        is_found = is_found or bool(np.isfinite(overlap.lower))
-    if not cad_forms:
-        yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
-    if finer and is_small:
-        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
-    if not is_found:
-        for overlap in _common_parts(a, b, T, enough, attested, quick=False):
-            yield "exact", overlap
-    if finer:
-        yield "meshes", _by_meshes(a, b, T, finer.pop(), enough)
-    if CAD_CHORDS[-1] not in chords:  # Open CASCADE did not find the common part
-        yield "meshes", _by_meshes(a, b, T, CAD_CHORDS[-1], enough, thorough=True)
-
-
-def _common_parts(a: Model, b: Model, T: Array, enough: Enough, attested: float, *, quick: bool) -> Iterator[Distance]:
-    """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
-
-    ``quick``: the first, which makes it, within a second, not in five. ``attested``: how deep (mm) a point lies.
-    """
-    from clamp3d.engine.exact import SHARES, exact_overlap
-
-    def end(bounds: Distance, closest: Distance) -> bool:
-        if enough(closest):
-            return enough(bounds)
-        return share != SHARES[-1] or bounds.lower >= _OPEN * closest.lower  # finer samples may decide it
-
-    for share in SHARES:
-        overlap = exact_overlap(a, b, T, share, end=end, quick=quick and share == SHARES[0], attested=attested)
-        yield overlap
-        if np.isinf(overlap.lower):
-            break
-
-
-def _by_meshes(a: Model, b: Model, T: Array, chord: float, enough: Enough, *, thorough: bool = False) -> Distance:
-    """What meshes say of two solids from CAD; nothing where they take too long to make."""
-    try:
-        return meshes_distance(a, b, T, chord, enough, thorough=thorough, cuts=CUTS if thorough else FEW_CUTS)
-    except Clamp3dError:
-        return Distance(method="without fine meshes")
 
 
 def _is_round(model: Model) -> bool:

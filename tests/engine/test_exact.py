@@ -12,8 +12,8 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from clamp3d import Scene, check
 from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
-from clamp3d.engine import refine as refine_module
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.cad_pair import CadPair
 from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import SHARES, _measured, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.farthest import Pieces, farthest
@@ -293,7 +293,9 @@ def test_samples_that_cannot_decide_an_interference_are_given_up_but_for_the_fin
 
     monkeypatch.setattr(Pieces, "cut", counted)
     answers = []
-    for answer in refine_module._common_parts(a, b, np.eye(4), lambda d: d.lower >= -0.01, 0.0101, quick=True):
+    pair = CadPair(a, b, np.eye(4), lambda d: d.lower >= -0.01)
+    pair._attested = 0.0101
+    for _, answer in pair._common_part(quick=True):
         answers.append((len(cuts), answer.lower))
     assert [n for n, _ in answers[:2]] == [0, 0] < [answers[2][0]]
     assert -0.0107 < answers[2][1] <= -0.0101
