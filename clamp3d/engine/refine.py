@@ -65,7 +65,7 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
         yield "meshes", open_distance(a, b, T)
         return
     if cad_forms or a.exact is None or b.exact is None:
-        yield from _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+        yield from _by_closed_forms(a, b, T, enough)
         if _is_round(b) and not a.bracketed and a.chords:
             yield "facets", rods_distance(a.outer(a.chords[-1]), b.bodies or (), T)
         if _is_round(a) and not b.bracketed and b.chords:
@@ -73,7 +73,7 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
     if a.exact is not None and b.exact is not None:
         from clamp3d.engine.cad_pair import CadPair
 
-        closed_forms = iter(()) if cad_forms else _by_closed_forms(a.quick_bodies, b.quick_bodies, T, enough)
+        closed_forms = iter(()) if cad_forms else _by_closed_forms(a, b, T, enough)
         yield from CadPair(a, b, T, enough).levels(closed_forms)
         return
     for chord in _chords(a, b):
@@ -110,10 +110,10 @@ def _agreed(old: Distance, new: Distance) -> Distance:
     return replace(met, lower=min(met.lower, met.upper), upper=max(met.lower, met.upper))
 
 
-def _by_closed_forms(a: Forms | None, b: Forms | None, T: Array, enough: Enough) -> Iterator[tuple[str, Distance]]:
-    """What the closed forms of two parts say, if both have one."""
-    if a is not None and b is not None:
-        yield "features", _nearest_forms(a, b, T, enough)
+def _by_closed_forms(a: Model, b: Model, T: Array, enough: Enough) -> Iterator[tuple[str, Distance]]:
+    """What the closed forms of two parts say, if both have one; they are made when this is asked for."""
+    if a.quick_bodies is not None and b.quick_bodies is not None:
+        yield "features", _nearest_forms(a.quick_bodies, b.quick_bodies, T, enough)
 
 
 def _nearest_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:

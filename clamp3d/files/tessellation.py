@@ -40,6 +40,8 @@ _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
 """About how many places of a spline are looked at besides those of each triangle."""
+_AT_ONCE = 200_000
+"""Pairs of a place and a triangle that are looked at together: some 20 MB."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,15 +170,23 @@ def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Ar
     empty[tuple(cells)] = False
     middles = [0.5 * (grid[1:] + grid[:-1])[rows] for grid, rows in zip(grids, np.nonzero(empty), strict=True)]
     at = np.column_stack(middles)[:: 1 + int(empty.sum()) // _MOST_PLACES]
-    if len(at):
-        import igl
-
-        flat, places = (np.column_stack([x, np.zeros(len(x))]) for x in (uv, at))
-        square, row, _ = igl.point_mesh_squared_distance(places, flat, np.ascontiguousarray(triangles))
-        on_face = square <= (1e-9 * np.abs(uv).max()) ** 2
-        row, true = row[on_face], points_on(face, at[on_face])
-        np.maximum.at(off, row, np.linalg.norm(closest_points(points[triangles[row]], true) - true, axis=1))
+    groups = np.array_split(at, 1 + len(at) * len(triangles) // _AT_ONCE)
+    row = np.concatenate([_triangle_at(some, uv[triangles]) for some in groups])
+    row, true = row[row >= 0], points_on(face, at[row >= 0])
+    np.maximum.at(off, row, np.linalg.norm(closest_points(points[triangles[row]], true) - true, axis=1))
     return off
+
+
+def _triangle_at(places: Array, triangles: Array) -> IntArray:
+    """Which of triangles (m, 3, 2) in the plane each of the places (n, 2) is in: numbers (n,), -1 for none."""
+    side = np.roll(triangles, -1, axis=1) - triangles
+    away = places[:, None, None] - triangles
+    areas = side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0]  # signed, of a side and the place
+    whole = areas.sum(axis=2)
+    least = (np.sign(whole)[..., None] * areas).min(axis=2)
+    share = np.divide(least, np.abs(whole), out=np.full_like(whole, -np.inf), where=whole != 0.0)
+    row = share.argmax(axis=1)
+    return np.where(share[np.arange(len(row)), row] >= -1e-9, row, -1)
 
 
 def _grid(surface: Any, along: str) -> Array:
