@@ -10,6 +10,7 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
 from clamp3d import Scene, check
+from clamp3d.engine import depth as depth_module
 from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
@@ -77,6 +78,13 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     assert -distance.lower > 0.5
     assert ("CASCADE" in distance.method) is found
     assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
+
+
+def test_where_no_meshes_overlap_the_depth_is_that_of_a_point_and_no_way_out_is_known(monkeypatch):
+    a, b = models("ball_on_plate", -0.02)
+    monkeypatch.setattr(depth_module, "_overlapping_meshes", lambda *_: iter(()))
+    distance = penetration(a, b, np.eye(4), Distance(-0.05, -0.01))
+    assert (distance.lower, distance.upper, distance.interference) == (-np.inf, -0.01, (0.01, 0.05))
 
 
 @pytest.mark.parametrize("family", ["cones_side_by_side", "ball_in_cone"])
