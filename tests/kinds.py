@@ -75,15 +75,15 @@ def poses(reach):
     return st.builds(pose, axis, angle, st.tuples(*[st.floats(-reach, reach)] * 3))
 
 
-def row_of(a, b, T, *, distances=False, **scene):
+def row_of(a, b, T, *, distances=False, cache=None, **scene):
     """The one row of the check of two parts."""
-    (row,) = check(Scene(**scene).add("a", a).add("b", b, T), distances=distances).pairs
+    (row,) = check(Scene(**scene).add("a", a).add("b", b, T), distances=distances, cache=cache).pairs
     return row
 
 
-def measured_alike(scene, result):
+def measured_alike(scene, result, cache=None):
     """A check that measures every pair; its verdicts are those of ``result``, which only bounded the distances."""
-    complete = check(replace(scene, motions=()), pairs=result.asked, distances=True)
+    complete = check(replace(scene, motions=()), pairs=result.asked, distances=True, cache=cache)
     for row in complete.pairs:
         assert result.verdict(row.a, row.b) is row.verdict, (row.a, row.b)
     return complete

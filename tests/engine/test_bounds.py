@@ -49,7 +49,7 @@ def test_turns_that_are_carried_across_their_axis(seed):
     T[:3, 3] = aside / np.linalg.norm(aside) * rng.uniform(7.0, 10.0)
     point, travel = T[:3, 3] + 8.0 * rng.normal(size=3), 12.0 * rng.normal(size=3)
     way = Motion(axis / np.linalg.norm(axis), point, 2.0 * half, travel)
-    least = min(distance(block, block, way.at(t, T)).upper for t in np.linspace(0.0, 1.0, 17))
+    least = min(distance(block, block, way.at(t, T), cache=CACHE).upper for t in np.linspace(0.0, 1.0, 17))
     pair = moving_pair.MovingPair(CACHE.model(block), CACHE.model(block), way, T, np.eye(4))
     assert pair.between(0.0, 1.0) <= least
 
@@ -143,7 +143,8 @@ def test_bounds_of_a_stretch_are_near_what_is_least_on_it():
         stretch = [pose_at(way, t, T) for t in (0.0, 0.5, 1.0)]
         bounds.append(swept_lower(tube, pin, *stretch, angle=0.5 * way.angle))
         bounds.append(swept_lower(pin, tube, *map(inverse, stretch), angle=-0.5 * way.angle))
-        truths += 2 * [min(distance(tube.shape, pin.shape, pose_at(way, t, T)).value for t in np.linspace(0.0, 1.0, 9))]
+        places = [pose_at(way, t, T) for t in np.linspace(0.0, 1.0, 9)]
+        truths += 2 * [min(distance(tube.shape, pin.shape, place, cache=CACHE).value for place in places)]
     assert_tight(bounds, truths, 0.06)
 
 

@@ -52,7 +52,7 @@ def test_the_reference_clamp(run):
     assert found["P1", "P4"].value == pytest.approx(1.0, abs=1e-9)
     touching = {pair for pair, d in found.items() if d.value <= 1e-6}
     assert touching == {(item.a, item.b) for item in scene.allowed} - {("P1", "P4"), ("P2", "P4")}
-    measured_alike(scene, check(scene))
+    measured_alike(scene, check(scene, cache=CACHE), CACHE)
     for groove, part in itertools.product(("P1", "P2"), ("P6", "P7")):
         assert found[groove, part].method == "groove kernel"
     for a, b in (("P1", "P2"), ("P3", "P5")):

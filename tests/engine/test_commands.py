@@ -11,6 +11,7 @@ import pytest
 
 from clamp3d import Distance, Motion, Verdict, check, load_scene
 from clamp3d.engine import judge, moving_pair
+from clamp3d.engine.model import ModelCache
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import SolverError
 from clamp3d.scenefile.file import parse_scene
@@ -80,14 +81,11 @@ def test_distances_measures_pairs_that_a_verdict_does_not_need(main):
     assert all(pair["at_most_mm"] - pair["at_least_mm"] < 0.1 for pair in every)
 
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
 @pytest.mark.parametrize("name", ["pipe-clip", "v-block", "hinge"])
 def test_example(name):
     expected = tomllib.loads((EXAMPLES / name / "expected.toml").read_text(encoding="utf-8"))
-    scene = load_scene(EXAMPLES / name / "scene.toml")
-    result = check(scene)
+    scene, cache = load_scene(EXAMPLES / name / "scene.toml"), ModelCache()
+    result = check(scene, cache=cache)
     assert result.clean == (expected["exit"] == 0)
     rows = {f"{row.a}:{row.b}": row for row in result.pairs}
     rows |= {f"{row.motion} {row.a}:{row.b}": row for row in result.motions}
@@ -99,7 +97,7 @@ def test_example(name):
             assert found.lower - 1e-6 <= value["distance"] <= found.upper + 1e-6
             # No bound so wide that anything fits: the meshes' chord errors are 0.05 mm together, doubled on a way.
             assert found.upper - found.lower <= 0.21
-    measured_alike(scene, result)
+    measured_alike(scene, result, cache)
 
 
 SCENE = """

@@ -240,7 +240,7 @@ def test_bodies_of_one_mesh_are_one_part(second, hollow, turned):
         other[0, 0] = 4.0  # beside the cavity
     bodies = [box_mesh(FIRST), box_mesh(other), *([box_mesh(CAVITY, inward=True)] if hollow else [])]
     whole = trimesh.util.concatenate(bodies[::-1] if turned else bodies)
-    part = mesh_shape(whole)
+    part, cache = mesh_shape(whole), ModelCache()
     if second == "touching all over":  # what lies between the two is no wall of the part
         assert not (np.abs(part.mesh.vertices[part.mesh.faces][:, :, 0] - 5.0) < 1e-9).all(axis=1).any()
     rng = np.random.default_rng(5)
@@ -248,7 +248,7 @@ def test_bodies_of_one_mesh_are_one_part(second, hollow, turned):
         probe = np.array([-0.5, 0.5])[:, None] + centre
         truth = shared(probe, FIRST) + shared(probe, other) - shared(probe, FIRST, other)
         truth -= hollow * (shared(probe, CAVITY) - shared(probe, CAVITY, other))
-        row = row_of(part, CUBE, translation(*centre), distances=True)
+        row = row_of(part, CUBE, translation(*centre), distances=True, cache=cache)
         verdicts = {"contained"} if truth > 1.0 - 1e-12 else {"clash"} if truth > 0.0 else {"clear", "contact"}
         assert row.verdict.value in verdicts
         if truth > 0.0:
@@ -287,14 +287,14 @@ def union(place, boxes):
 
 @pytest.mark.parametrize("form", ["mesh", "drawn"])
 def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
-    part, boxes = loop()
+    (part, boxes), cache = loop(), ModelCache()
     cube = box_mesh([[-0.5] * 3, [0.5] * 3])
     probe = CUBE if form == "drawn" else mesh_shape(cube)
     rng = np.random.default_rng(3)
     drawn = rng.uniform([10, -15, -8.4], [35, 15, 8.4], (40, 3))
     for centre in [(31, 0, 0), (20, 6, 0), (20, 7, 3), (20, 0, 0), *drawn]:
         place = np.array([-0.5, 0.5])[:, None] + centre
-        pair = row_of(part, probe, translation(*centre), distances=True)
+        pair = row_of(part, probe, translation(*centre), distances=True, cache=cache)
         distance, truth = pair.distance, union(place, boxes)
         if truth == 0.0:
             away = [np.linalg.norm(np.maximum(0.0, np.maximum(b[0] - place[1], place[0] - b[1]))) for b in boxes]
@@ -312,9 +312,9 @@ def test_walls_of_a_surface_inside_of_what_it_covers_are_no_end_of_it(form):
 def test_no_body_is_lost_that_touches_others_and_is_inside_out(way, inward):
     boxes = [np.array([[-5.0] * 3, [5.0] * 3]) + k * np.array(way) for k in range(3)]
     whole = trimesh.util.concatenate([box_mesh(box, inward=k in inward) for k, box in enumerate(boxes)])
-    part = mesh_shape(whole)
+    part, cache = mesh_shape(whole), ModelCache()
     for box in boxes:
-        pair = row_of(part, CUBE, translation(*box.mean(axis=0)))
+        pair = row_of(part, CUBE, translation(*box.mean(axis=0)), cache=cache)
         assert pair.verdict is Verdict.CONTAINED
         assert pair.where.volume == pytest.approx((1.0, 1.0))
 

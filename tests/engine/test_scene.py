@@ -137,13 +137,13 @@ HALF_ROD = shapes.extrusion(Profile((Arc((0.0, 0.0), 9.0, 0.0, math.pi), Segment
 @pytest.mark.parametrize("moving", [shapes.cylinder(6.0, 40.0), shapes.box((9.0, 14.0, 30.0)), HALF_ROD])
 def test_many_poses_have_the_verdicts_of_one_at_a_time(moving):
     """Nearly all overlaps are found in all poses at once; progress counts those that are looked at by themselves."""
-    rng, stages, cache = np.random.default_rng(5), [], ModelCache()
+    rng, stages, cache, alone = np.random.default_rng(5), [], ModelCache(), ModelCache()
     poses = np.array([translation(*rng.uniform(-30, 30, 3)) @ rotation(rng.normal(size=3), 2.0) for _ in range(120)])
     block = shapes.groove_block(SweptArc(8.0, 1.3, 50.0), 50.0, 30.0)
     scene = Scene().add("block", block).add("part", moving)
     sweep = check_poses(scene, "part", poses, progress=lambda *stage: stages.append(stage), cache=cache)
     for T, kind, most in zip(poses[sweep.row], sweep.kind, sweep.most, strict=True):
-        row = check(scene.moved({"part": T}), pairs=[("block", "part")], distances=True).pairs[0]
+        (row,) = check(scene.moved({"part": T}), pairs=[("block", "part")], distances=True, cache=alone).pairs
         assert kind == row.verdict.value
         assert most >= min(row.distance.lower, -row.distance.interference[1] if row.distance.interference else np.inf)
     assert [(name, n) for name, n, _ in stages] == [("poses", n) for n in range(len(stages))]
