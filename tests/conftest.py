@@ -89,6 +89,12 @@ def run():
 
 
 @pytest.fixture
+def without_pictures(monkeypatch):
+    """Pages of reports without their pictures, which take long to draw."""
+    monkeypatch.setattr("clamp3d.output.report_page._pictures", lambda *_: {"overview": [], "steps": [], "pairs": []})
+
+
+@pytest.fixture
 def main():
     """The command line in this process: code, stdout, stderr."""
     return call

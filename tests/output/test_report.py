@@ -154,20 +154,23 @@ def test_a_clashing_scene_says_so_worst_first(tmp_path):
 def test_scenes_without_findings_pairs_or_parts(tmp_path):
     assert "No issues found." in report(Scene().add("pin", shapes.cylinder(5.0, 40.0)), tmp_path)[0].read_text()
     assert report(Scene(), tmp_path)[2].read_text().startswith("a,b,verdict,distance_mm")
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_of_many_parts_the_near_ones_have_rows():
     grid = Scene()
     for i in range(40):
         grid = grid.add(f"p{i}", shapes.box((1, 1, 1)), translation(2.0 * i, 0, 0))
     found = make_report(grid.add("x", shapes.box((1, 1, 1)), translation(0.5, 0, 0)))
-    assert (found.n_pairs, len(found.rows)) == (820, 1)  # of so many pairs only the near ones have a row
+    assert (found.n_pairs, len(found.rows)) == (820, 1)
     page = report_html(found)
     assert "819 pairs are not listed: clear." in page
     assert "Parts of pairs that are not clear: 2 of 41 parts." in page
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_command_takes_scenes_and_meshes(tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
-    nothing = {kind: [] for kind in ("overview", "steps", "pairs")}  # pictures take long
-    monkeypatch.setattr("clamp3d.output.report_page._pictures", lambda *_: nothing)
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 30})
     assert main("report", "boxes.toml", "-q", "-o", "out")[0] == 1
     data = json.loads((tmp_path / "out" / "report.json").read_text())
