@@ -11,12 +11,12 @@ from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.vector import Vector
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy", cache=True)
 def on_arc(groove, rod, ez, limit, eps):
     return edges.on_arc(groove, rod, ez, limit, eps)
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy", cache=True)
 def bounds_about(groove, rod, ez, angle, half):
     arc = edges.end_arc_of(groove, rod, ez)
     course = edges.course_at(arc, rod, angle)
