@@ -45,6 +45,7 @@ def test_errors_of_table_4_are_those_that_the_paper_prints(tables):
 def test_the_page_has_the_tables_numbers(tables):
     rows = {(row.solver, row.unit_angle_deg): f"{row.distance:.3f}" for row in tables.table4}
     page = (ROOT / "docs" / "reproduction.md").read_text()
+    assert f"| arc (CAS) | {rows['stepped', None]} | {published.CAS_DISTANCE:.3f} | {rows['exact', None]} |" in page
     for unit, paper in published.CHORD_DISTANCES.items():
         name = f"chords of {unit:g} degree{'s' * (unit > 1)}"
         assert f"| {name} | {rows['stepped', unit]} | {paper:.3f} | {rows['exact', unit]} |" in page

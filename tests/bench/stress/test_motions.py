@@ -25,7 +25,7 @@ def test_cas_is_never_wrong_and_never_beyond_its_bound(family):
 
 
 def test_stepped_motion_misses_what_is_thin_and_cas_does_not():
-    outcomes, _ = run_family("motion: thin and fast", ["cas", "stepped 100"], 15, 1, 60.0, 0)
+    outcomes, _ = run_family("motion: thin and fast", ["cas", "stepped 100"], 8, 1, 60.0, 0)
     cas, stepped = outcomes
     assert (cas.wrong, cas.beyond_bound) == (0, 0)
     assert stepped.false_misses > 2
