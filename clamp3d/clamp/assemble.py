@@ -26,7 +26,6 @@ from clamp3d.clamp.stepped import SteppedState, solve_stepped
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.clamp.ways import Closing, Meetings
 from clamp3d.errors import SolverError
-from clamp3d.geometry.pose import Array
 
 STEP, TILT_STEP = 1.0 / 3.0, math.radians(1.0)
 """Move along the bolt (mm) and turn (rad) of the paper's program, derived from its Table 4."""
@@ -101,31 +100,19 @@ def assemble(
     log, start = Log(section, on_waypoint), open_start(section)
     final: FinalState | SteppedState
     if solver == "exact":
-        final, closing = _close(section, start)
+        met: Meetings = []
+        final = proven = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
+        met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
+        closing = Closing(start, final.held, final.q, met)
     else:
         until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
         final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
-        closing = Closing(start, final.q, final.q, [])
-    return _assembled(log, steps, closing, final, solver, resolution, others)
-
-
-def _assembled(
-    log: Log,
-    steps: tuple[Step, ...],
-    closing: Closing,
-    final: FinalState | SteppedState,
-    solver: Solver,
-    resolution: float,
-    others: bool,
-) -> Assembly:
-    """Play the sequence of a closing that was solved, and measure its end."""
-    section, clamp, model = log.section, log.section.clamp, log.section.model
-    travel = play(steps, closing, log)
+        proven, closing = None, Closing(start, final.q, final.q, [])
+    play(steps, closing, log)
     poses = section.poses(final.q)
     contacts = measure_contacts(clamp, poses, model, cache=log.cache)
     _add_silent_contacts(log, steps, closing, contacts, resolution)
     queries = section.queries  # what the assembly itself asked, without the other equilibria
-    q, proven = closing.start, final if isinstance(final, FinalState) else None
     return Assembly(
         clamp=clamp,
         model=model,
@@ -134,7 +121,7 @@ def _assembled(
         distance=section.splint_distance(final.q),
         closing=section.down_splint(final.q).y,
         tilt=float(final.q[S]) / section.lever,
-        turns=clamp.bolt.turn(travel) / (2.0 * math.pi),
+        turns=clamp.bolt.turn(closing.travel) / (2.0 * math.pi),
         poses=poses,
         contacts=contacts,
         events=tuple(log.events),
@@ -144,19 +131,11 @@ def _assembled(
         violation=proven.violation if proven else None,
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
-        start=Start(float(q[D]), 0.0, (float(q[0]), float(q[1])), (float(q[2]), float(q[3]))),
+        start=Start(float(start[D]), 0.0, (float(start[0]), float(start[1])), (float(start[2]), float(start[3]))),
         forces=proven.forces(section) if proven else (),
         others=_others(section, proven) if proven and others else None,
         with_play=_with_play(section, proven) if proven and others else None,
     )
-
-
-def _close(section: Section, start: Array) -> tuple[FinalState, Closing]:
-    """The proven final state and how the closing came there."""
-    met: Meetings = []
-    final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
-    met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-    return final, Closing(start, final.held, final.q, met)
 
 
 def _add_silent_contacts(

@@ -65,23 +65,19 @@ class Log:
         return shifted
 
 
-def play(steps: tuple[Step, ...], closing: Closing, log: Log) -> float:
-    """Play ``steps``; returns the way that the nut has gone when it is tight, mm.
-
-    Raises SequenceError for a step that no way leads to.
-    """
+def play(steps: tuple[Step, ...], closing: Closing, log: Log) -> None:
+    """Play ``steps``. Raises SequenceError for a step that no way leads to."""
     published = _published_ways(log.section, closing.start) if as_published(steps) else None
-    plan, travel = Plan(log.section, steps, closing, log.cache, published), 0.0
+    plan = Plan(log.section, steps, closing, log.cache, published)
     log.aside = plan.offsets(0)
     log.reach(steps[0].name, "open clamp beside the line" if plan.is_published else "parts apart", plan.bases[0])
     for k, step in enumerate(steps):
         if step.kind == "close":
             _close_splints(step.name, closing, log)
         elif step.kind == "tighten":
-            travel = _tighten_nut(step, closing, log)
+            _tighten_nut(step, closing, log)
         else:
             _bring(plan, k, log)
-    return travel
 
 
 def _published_ways(section: Section, start: Array) -> list[tuple[Leg, ...]]:
@@ -142,10 +138,10 @@ def _meeting(pair: Pair) -> str:
     return f"{TITLES[a]} touches {b}"
 
 
-def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
+def _tighten_nut(step: Step, closing: Closing, log: Log) -> None:
     """The nut draws the saddle up to the round back, and both on to the end if the joints have play.
 
-    If the down splint has not been closed by hand, the saddle takes it along. Returns the way that the nut has gone.
+    If the down splint has not been closed by hand, the saddle takes it along.
     """
     section, d, takes_along = log.section, float(closing.start[D]), "P2" in step.parts
     seated = closing.end if takes_along else closing.held
@@ -155,11 +151,10 @@ def _tighten_nut(step: Step, closing: Closing, log: Log) -> float:
         if takes_along:
             log.reach(step.name, _meeting(pair), section.poses(q))
         log.touch(step.name, [pair], section.poses(q), d - float(q[D]))
-    end, travel = section.poses(closing.end), d - float(closing.end[D])
+    end = section.poses(closing.end)
     log.reach(step.name, "nut tightened", end)
     log.touch(step.name, [("P2", "P3")], section.poses(seated), d - float(seated[D]))
-    log.touch(step.name, [("P1", "P5"), ("P3", "P4")], end, travel)
-    return travel
+    log.touch(step.name, [("P1", "P5"), ("P3", "P4")], end, closing.travel)
 
 
 def meetings(clamp: Clamp, path: Sequence[Waypoint], pairs: Sequence[Pair], cache: ModelCache) -> dict[Pair, str]:

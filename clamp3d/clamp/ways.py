@@ -240,6 +240,11 @@ class Closing:
     end: Array
     met: Meetings
 
+    @property
+    def travel(self) -> float:
+        """The way that the nut goes until it is tight, mm."""
+        return float(self.start[D] - self.end[D])
+
 
 class Plan:
     """The ways of all ``steps``, and where each part stands before each step.
@@ -262,8 +267,7 @@ class Plan:
         self.bases = [start]
         for step in steps:
             self.bases.append({"bring": self.bases[-1], "close": held, "tighten": end}[step.kind])
-        rise = float(closing.start[D] - closing.end[D])
-        self.legs = published or [self._way(k, rise) for k in range(len(steps))]
+        self.legs = published or [self._way(k, closing.travel) for k in range(len(steps))]
         if not self.is_published:
             self._spread()
 
