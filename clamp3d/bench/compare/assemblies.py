@@ -49,13 +49,13 @@ class Imaged:
     automatic_seconds: float
 
 
-def assembled(method: Method, *, time_limit: float = 300.0) -> Assembled:
+def assembled(method: Method) -> Assembled:
     """Assemble the reference clamp by the exact solver; quick ones several times, the least time counts."""
     clamp = load_clamp("reference")
     load(method)
     assemble(clamp, assembly_model(Method("cas"), clamp))  # compiles and loads what all share
     start = time.process_time()
-    model = assembly_model(method, clamp, time_limit=time_limit)
+    model = assembly_model(method, clamp)
     setup = time.process_time() - start + coacd_seconds(model)
     times: list[float] = []
     while not times or (len(times) < 10 and sum(times) < 1.0):

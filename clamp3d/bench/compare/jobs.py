@@ -43,8 +43,8 @@ def answer(kind: str, family: str, setting: float | None) -> Any:
 
         return assembled(method)
     from clamp3d.bench.compare.measure import measure
-    from clamp3d.bench.compare.methods import load, prepare
     from clamp3d.bench.compare.peers import load_peer, prepare_peer
 
-    how = {"load": load_peer, "prepare": prepare_peer} if kind == "peer" else {"load": load, "prepare": prepare}
-    return measure(method, **how)
+    if kind == "peer":
+        return measure(method, load=load_peer, prepare=prepare_peer)
+    return measure(method)

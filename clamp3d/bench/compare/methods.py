@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clamp3d.baselines import ContactModel, contact_model
-from clamp3d.bench.compare.scene import GROOVE, WIRE, block, chord_error, in_part_frame, pair
+from clamp3d.bench.compare.scene import BLOCK, GROOVE, PAIR, WIRE, chord_error
 from clamp3d.geometry.pose import Array, inverse
-from clamp3d.kernel.contact_model import GroovePair
 
 if TYPE_CHECKING:
     from clamp3d.clamp.dimensions import Clamp
@@ -83,17 +82,23 @@ def load(method: Method) -> None:
         importlib.import_module(module)
 
 
-def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
+def prepare(method: Method) -> Prepared:
     """Set a method up for the scene of `compare.scene`; everything that can be done before the first pose is done.
 
     Raises InputError for an unknown method, and what the method itself raises.
     """
     if method.family == "cas":
         return _cas()
-    model, groove = _block_model(method, time_limit), pair()
+    settings = _settings(method)
+    if method.family == "hulls":  # on CoACD's own scale
+        from clamp3d.baselines.decomposition import DecompositionParameters
+
+        settings["threshold"] = DecompositionParameters(threshold=method.setting or 0.0, real_metric=False)
+        settings["mesh_error"] = chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9)
+    model = contact_model(method.family, {"P1": BLOCK}, **settings, progress=False)
 
     def many(poses: Array) -> Array:
-        return model.distances(groove, in_part_frame(poses))
+        return model.distances(PAIR, PAIR.T_a_groove @ poses @ inverse(PAIR.T_b_cylinder))
 
     def one(pose: Array) -> float:
         return float(many(pose[None])[0])
@@ -102,20 +107,20 @@ def prepare(method: Method, *, time_limit: float = 300.0) -> Prepared:
     return Prepared(
         one,
         many,
-        _piece_count(model, groove),
+        _piece_count(model),
         parallel_only=model.name == "chords",
         elsewhere=coacd_seconds(model),
     )
 
 
-def assembly_model(method: Method, clamp: Clamp, *, time_limit: float = 300.0) -> ContactModel:
+def assembly_model(method: Method, clamp: Clamp) -> ContactModel:
     """The method for the parts of a clamp, set up for all of its grooves; hull thresholds are in mm here."""
     from clamp3d.clamp.parts import groove_pairs, parts
 
     settings = _settings(method)
     if method.family == "hulls":
         settings |= {"threshold": method.setting, "mesh_error": 0.01}
-    model = contact_model(method.family, parts(clamp), **settings, time_limit=time_limit, progress=False)
+    model = contact_model(method.family, parts(clamp), **settings, progress=False)
     for groove in groove_pairs(clamp).values():  # models make their pieces on first use
         model.pieces(groove, groove.T_a_groove @ inverse(groove.T_b_cylinder))
     return model
@@ -131,17 +136,6 @@ def _cas() -> Prepared:
     )
 
 
-def _block_model(method: Method, time_limit: float) -> ContactModel:
-    """The contact model for the block; hull thresholds are on CoACD's own scale here."""
-    from clamp3d.baselines.decomposition import DecompositionParameters
-
-    settings = _settings(method)
-    if method.family == "hulls":
-        settings["threshold"] = DecompositionParameters(threshold=method.setting or 0.0, real_metric=False)
-        settings["mesh_error"] = chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9)
-    return contact_model(method.family, {"P1": block()}, **settings, time_limit=time_limit, progress=False)
-
-
 def _settings(method: Method) -> dict[str, Any]:
     """The setting of chords, wedges and mesh as `contact_model` takes it."""
     if method.setting is None:
@@ -151,11 +145,11 @@ def _settings(method: Method) -> dict[str, Any]:
     return {"mesh_error": method.setting} if method.family == "mesh" else {}
 
 
-def _piece_count(model: Any, groove: GroovePair) -> int:
+def _piece_count(model: Any) -> int:
     """Chords, wedges, hulls or triangles of the groove's part."""
     if model.name == "chords":
-        return int(model.segments([groove]))
-    shapes = model.polytopes(groove.a).shapes
+        return int(model.segments([PAIR]))
+    shapes = model.polytopes(PAIR.a).shapes
     return len(shapes[0].solid.faces) if model.name == "mesh" else len(shapes)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clamp3d.baselines import chords
 from clamp3d.geometry.extrusion import Extrusion
-from clamp3d.geometry.pose import Array, inverse, rotation
+from clamp3d.geometry.pose import Array, rotation
 from clamp3d.geometry.primitives import Cylinder, SweptArc
 from clamp3d.geometry.profile import Arc, Profile
 from clamp3d.geometry.shapes import Solid
@@ -56,6 +56,10 @@ GROOVE = SweptArc(12.0, math.radians(70.0), 60.0)
 WIRE = Cylinder(10.5, 200.0)
 WIDTH, DEPTH = 137.0, 30.0
 """Of the block in mm; it is as long as its groove."""
+BLOCK = grooved_block(GROOVE, width=WIDTH, depth=DEPTH)
+"""The grooved block in its part frame."""
+PAIR = block_pair(GROOVE, WIRE)
+"""Groove and wire for a contact model."""
 
 BANDS = (0.02, 1e-4, 1e-6)
 """Near contact: poses with a distance of either sign up to so many mm."""
@@ -131,22 +135,6 @@ def pose(origin: list[float], turn: list[float]) -> Array:
     T[:3, :2] = (C / lean)[:, :2] @ S[:, :2]
     T[:3, 3] = origin
     return T
-
-
-def block() -> Solid:
-    """The grooved block in its part frame."""
-    return grooved_block(GROOVE, width=WIDTH, depth=DEPTH)
-
-
-def pair() -> GroovePair:
-    """Groove and wire for a contact model."""
-    return block_pair(GROOVE, WIRE)
-
-
-def in_part_frame(T: Array) -> Array:
-    """Poses ``T_a_b`` of `pair` for poses (n, 4, 4) of the wire in the groove's frame; no rounding: quarter turns."""
-    groove_and_wire = pair()
-    return np.asarray(groove_and_wire.T_a_groove @ T @ inverse(groove_and_wire.T_b_cylinder))
 
 
 def chord_error(unit_angle: float) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 from clamp3d.bench.compare.methods import AXIS_ANGLES_DEG, SECTOR_ANGLES_DEG, Prepared, Series, ready
 from clamp3d.bench.compare.peers.pieces import AXIS, boxes, sectors, surface
 from clamp3d.bench.compare.scene import WIRE
+from clamp3d.engine.surface import fcl_tree
 from clamp3d.geometry.pose import Array
 
 
@@ -33,14 +34,10 @@ def _tree(unit_angle: float) -> Prepared:
     return ready(one, len(keep), depth=False, keep=keep)
 
 
-def _mesh(V: Array, F: Array) -> Any:
+def _mesh(V: Array, F: Any) -> Any:
     import fcl
 
-    model = fcl.BVHModel()
-    model.beginModel(len(V), len(F))
-    model.addSubModel(V, F)
-    model.endModel()
-    return fcl.CollisionObject(model, fcl.Transform())
+    return fcl.CollisionObject(fcl_tree(V, F), fcl.Transform())
 
 
 def _axis(unit_angle: float) -> Prepared:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
-from clamp3d.bench.compare.scene import WIRE, block, chord_error, pair
+from clamp3d.bench.compare.scene import BLOCK, PAIR, WIRE, chord_error
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 
@@ -31,8 +31,8 @@ def _make(unit_angle: float) -> Prepared:
         V, F = np.ascontiguousarray(V, float), np.ascontiguousarray(F, np.uint64)
         return manifold3d.Manifold(manifold3d.Mesh64(vert_properties=V, tri_verts=F))
 
-    block_mesh, half = mesh(block(), chord_error(unit_angle) * (1.0 + 1e-9)), 0.5 * WIRE.length
-    part = manifold(block_mesh.vertices @ pair().T_a_groove[:3, :3], block_mesh.faces)
+    block_mesh, half = mesh(BLOCK, chord_error(unit_angle) * (1.0 + 1e-9)), 0.5 * WIRE.length
+    part = manifold(block_mesh.vertices @ PAIR.T_a_groove[:3, :3], block_mesh.faces)
     wire = manifold(
         np.array([(0.0, 0.0, -half), (_THIN, 0.0, -half), (0.0, _THIN, -half), (0.0, 0.0, half)]),
         [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)],

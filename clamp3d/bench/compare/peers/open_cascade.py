@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
-from clamp3d.bench.compare.scene import GROOVE, WIRE, block, pair
+from clamp3d.bench.compare.scene import BLOCK, GROOVE, PAIR, WIRE
 from clamp3d.files.open_cascade import explore, location
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.output.step import solid
@@ -65,7 +65,7 @@ def _near() -> Any:
         plane = surface.Plane()
         return abs(plane.Axis().Direction().Y()) > 0.5 and bool(plane.Location().Y() > -GROOVE.radius)
 
-    placed = solid(block()).Moved(location(inverse(pair().T_a_groove)))
+    placed = solid(BLOCK).Moved(location(inverse(PAIR.T_a_groove)))
     return together(filter(near, explore(placed, "FACE")))
 
 
