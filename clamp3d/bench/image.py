@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clamp3d.bench.picture import Picture, find_end_points, picture
+from clamp3d.bench.picture import find_end_points, picture
 from clamp3d.checks import array, choice, instance, number, whole
 from clamp3d.clamp.result import Assembly
 from clamp3d.errors import InputError
@@ -123,32 +123,20 @@ def measure_image(
     )
 
 
-def marked_distances(
-    shown: Picture, count: int, *, marking_error: float, calliper_error: float, seed: int, kind: Kind = "height"
-) -> Array:
-    """Distances (count,) mm from the picture's end points, each marked anew with normal errors, scaled by new readings.
-
-    Three marks a trial: the up splint's left end point serves as reference and as end point.
-    """
-    count = whole("count of trials", count, least=1)
-    marking_error = _check("marking_error", marking_error)
-    calliper_error = _check("calliper_error", calliper_error)
-    choice("kind", kind, ("height", "straight"))
-    rng = np.random.default_rng(seed)
-    marks = shown.end_points + rng.normal(0.0, marking_error, (count, 3, 2))
-    readings = shown.reference + rng.normal(0.0, calliper_error, count)
-    return _distance(marks[:, [[0, 2], [0, 1]]], readings, kind)
-
-
 def image_study(run: Assembly, *, count: int = 100_000, seed: int = 0) -> ImageStudy:
     """Draw the final state of ``run``, measure its height ``count`` times by hand marks and once automatically.
 
-    The first five trials are those to lay beside the paper's. Raises InputError for a count or seed out of range.
+    By hand three points are marked with normal errors, and the scale is a new reading: the up splint's left end point
+    serves as reference and as end point. The first five trials are those to lay beside the paper's. Raises InputError
+    for a count or seed out of range.
     """
     instance("run", run, Assembly)
     count, seed = whole("count of trials", count, least=5, most=100_000_000), whole("seed", seed, least=0)
     shown = picture(run, PX_PER_MM, seed=seed)
-    values = marked_distances(shown, count, marking_error=MARKING_ERROR, calliper_error=CALLIPER_ERROR, seed=seed)
+    rng = np.random.default_rng(seed)
+    marks = shown.end_points + rng.normal(0.0, MARKING_ERROR, (count, 3, 2))
+    readings = shown.reference + rng.normal(0.0, CALLIPER_ERROR, count)
+    values = _distance(marks[:, [[0, 2], [0, 1]]], readings, "height")
     left, right, below = find_end_points(shown.image)
     automatic = measure_image([left, below], [left, right], shown.reference, marking_error=FITTING_ERROR)
     return ImageStudy(shown.distance, values[:5], values - shown.distance, automatic)

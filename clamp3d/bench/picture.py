@@ -42,25 +42,25 @@ _STRAIGHT = 1.0  # px; an outline within this of a line is straight
 _ROUNDED = 10.0  # px; blur rounds a corner, so edges are looked for beyond this, and fitted from 4 px on
 _AROUND = 8  # px around a corner that decide where it is
 _MARGIN = 8.0  # mm around the parts
+_BLUR, _GRAIN = 1.0, 3.0  # px, and grey levels (one sigma)
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """``image`` (h, w, 3) with ``px_per_mm`` pixels to the millimetre, and the true ``end_points`` (3, 2) in pixels.
+    """``image`` (h, w, 3), and the true ``end_points`` (3, 2) in pixels.
 
     End points: left and right end of the up splint's inner edge, left end of the down splint's inner edge.
     ``reference`` in mm is the distance of the first two, ``distance`` that of the splints on the line side.
     """
 
     image: Image
-    px_per_mm: float
     end_points: Array
     reference: float
     distance: float
 
 
-def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float = 3.0, seed: int = 0) -> Picture:
-    """The final state of ``run`` at ``px_per_mm``, with ``blur`` in px and ``grain`` in grey levels (one sigma)."""
+def picture(run: Assembly, px_per_mm: float, *, seed: int = 0) -> Picture:
+    """The final state of ``run`` at ``px_per_mm`` pixels to the millimetre, blurred and grained."""
     from skimage.filters import gaussian
 
     outlines = [(name, points) for name in PAINT for points in _outlines(run, name)]
@@ -68,13 +68,12 @@ def picture(run: Assembly, px_per_mm: float, *, blur: float = 1.0, grain: float 
     low, high = everything.min(0) - _MARGIN, everything.max(0) + _MARGIN
     columns, rows = np.ceil((high - low) * px_per_mm).astype(int)
     image = _paint([(name, (points - low) * px_per_mm - 0.5) for name, points in outlines], columns, rows)
-    if blur > 0.0:
-        image = gaussian(image, blur, channel_axis=-1, preserve_range=True)
-    image = image + np.random.default_rng(seed).normal(0.0, grain, image.shape)
+    image = gaussian(image, _BLUR, channel_axis=-1, preserve_range=True)
+    image = image + np.random.default_rng(seed).normal(0.0, _GRAIN, image.shape)
     (left, below), (right, _) = inner_edges(run.clamp, run.poses)
     points = (np.array([left, right, below]) - low) * px_per_mm - 0.5
     reference = run.clamp.up_splint.width
-    return Picture(np.clip(np.rint(image), 0, 255).astype(np.uint8), px_per_mm, points, reference, run.distance)
+    return Picture(np.clip(np.rint(image), 0, 255).astype(np.uint8), points, reference, run.distance)
 
 
 def find_end_points(image: Image) -> Array:
