@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,9 @@ def body(shape: AnyBody) -> Body:
         return Body(lambda x: np.linalg.norm(x - np.clip(x, -axis, axis), axis=1) - r, np.array([-corner, corner]))
     if isinstance(shape, SweptArc):
         far = np.full(3, math.inf)
-        return Body(_groove(shape), np.array([-far, far]))
+        R, half_angle, H = shape.radius, shape.half_angle, 0.5 * shape.length
+        s, h = R * math.sin(half_angle), -R * math.cos(half_angle)
+        return Body(lambda x: groove_distance(x[:, 0], x[:, 1], x[:, 2], R, s, h, H), np.array([-far, far]))
     raise InputError(
         f"shape must be a Solid, MeshShape, Cylinder, Capsule, SweptArc or Body, got {type(shape).__name__}"
     )
@@ -72,7 +75,8 @@ def body(shape: AnyBody) -> Body:
 
 def _prism(across: Array, along: Array) -> Array:
     """From the distances across and along the axis of what is drawn along it."""
-    return np.asarray(np.hypot(np.maximum(across, 0), np.maximum(along, 0)) + np.minimum(np.maximum(across, along), 0))
+    outside = np.sqrt(np.maximum(across, 0) ** 2 + np.maximum(along, 0) ** 2)
+    return np.asarray(outside + np.minimum(np.maximum(across, along), 0))
 
 
 def _outline(profile: Profile) -> Callable[[Array], Array]:
@@ -124,18 +128,16 @@ def _solid(solid: Solid) -> Field:
     return field
 
 
-def _groove(groove: SweptArc) -> Field:
-    R, s, h = groove.radius, groove.radius * math.sin(groove.half_angle), -groove.radius * math.cos(groove.half_angle)
-
-    def field(x: Array) -> Array:
-        u, v = np.abs(x[:, 0]), x[:, 1]
-        rho, lip = np.hypot(u, v), np.hypot(u - s, v - h)
-        edge = np.minimum(
-            np.where(np.arctan2(u, -v) <= groove.half_angle, np.abs(rho - R), lip), np.where(u >= s, np.abs(v - h), lip)
-        )
-        return _prism(np.where((v <= h) & (rho >= R), -edge, edge), np.abs(x[:, 2]) - 0.5 * groove.length)
-
-    return field
+def groove_distance(x: Any, y: Any, z: Any, R: Any, sx: Any, h: Any, H: Any) -> NDArray[Any]:
+    """Signed distance of points from grooves with lips at (+-sx, h) and ends at +-H, in the numbers that are given."""
+    x = np.abs(x)
+    # Squares neither overflow nor vanish in the exponents of a long double.
+    rho = np.sqrt(x * x + y * y)
+    lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
+    arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
+    ray = np.where(x >= sx, np.abs(y - h), lip)
+    inside = (y <= h) & (rho >= R)
+    return _prism(np.where(inside, -1.0, 1.0) * np.minimum(arc, ray), np.abs(z) - H)
 
 
 def _mesh(vertices: Array, faces: NDArray[np.int64]) -> Field:

@@ -9,7 +9,6 @@ with a lower value is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -267,9 +266,6 @@ class MotionFamily(Family):
 
     methods = METHODS
     truth_error = TRUTH_ERROR
-
-    def __init__(self, name: str, about: str, make: Callable[[np.random.Generator, int], Motions]) -> None:
-        super().__init__(name, about, make)
 
     def truths(self, cases: Motions) -> Truths:
         """See the module: times that the reference names are looked at too."""

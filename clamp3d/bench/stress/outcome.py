@@ -162,20 +162,14 @@ def judge(
     exact: NDArray[Any],
     answers: Answers,
     measures: Measures,
-    *,
-    band: Array | None = None,
 ) -> Outcome:
-    """Score distances; ``exact`` (n,) are long doubles, ``size`` (n,) the size of each scene in mm.
-
-    ``band`` (n,) mm is the distance from 0 up to which a case touches; by default as the module says.
-    """
+    """Score distances; ``exact`` (n,) are long doubles, ``size`` (n,) the size of each scene in mm."""
     have = np.isfinite(answers.distance)
     # An answer that is not a number is no answer and no refusal.
     answers.failed |= answers.tried & ~have & ~answers.refused
     answers.failed[answers.crashed + answers.timeouts] = False
     error = np.abs(np.asarray(answers.distance - exact, np.float64))
-    if band is None:
-        band = answers.bound if name == REFERENCE else TOUCHING * size
+    band = answers.bound if name == REFERENCE else TOUCHING * size
     decided = have & (np.abs(np.asarray(exact, np.float64)) > band)
     hit, overlap = answers.distance < 0.0, np.asarray(exact < 0, bool)
     counts = have & (measures != "verdict") & (np.asarray(exact >= 0, bool) | (measures == "depth"))

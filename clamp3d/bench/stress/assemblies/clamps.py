@@ -82,9 +82,9 @@ def clamp_of(
         return None
 
 
-def _near_one(rng: np.random.Generator, shape: int, low: float = -12.0, high: float = -3.0) -> Array:
+def _near_one(rng: np.random.Generator, shape: int) -> Array:
     """1 +- 1e-12 ... 1e-3, or just 1."""
-    off = 10.0 ** rng.uniform(low, high, shape) * rng.choice([-1.0, 0.0, 1.0], shape, p=[0.4, 0.2, 0.4])
+    off = 10.0 ** rng.uniform(-12.0, -3.0, shape) * rng.choice([-1.0, 0.0, 1.0], shape, p=[0.4, 0.2, 0.4])
     return np.asarray(1.0 + off)
 
 
@@ -96,15 +96,6 @@ def _grooves(rng: np.random.Generator) -> tuple[Array, Array, Array]:
         np.arccos(np.cos(rng.uniform(0.3, 1.3, 4))),
         _OFFSET * rng.uniform(0.85, 1.15, 4),
     )
-
-
-def random_clamp(rng: np.random.Generator) -> Clamp:
-    """A clamp of the reference's kind with any grooves and any wires."""
-    clamp = None
-    while clamp is None:
-        R, half, offset = _grooves(rng)
-        clamp = clamp_of(R, half, offset, rng.uniform(2.0, 60.0, 2))
-    return clamp
 
 
 def open_start(rng: np.random.Generator, section: Section) -> Array:
@@ -125,16 +116,17 @@ def open_start(rng: np.random.Generator, section: Section) -> Array:
 
 
 @MAKERS.family("random clamps", _fitting)
-def _random(rng: np.random.Generator) -> Clamp:
+def _random(rng: np.random.Generator) -> Clamp | None:
     """Grooves and wires of any size, closed from the open clamp."""
-    return random_clamp(rng)
+    R, half, offset = _grooves(rng)
+    return clamp_of(R, half, offset, rng.uniform(2.0, 60.0, 2))
 
 
 @MAKERS.family("poor starts", _fitting)
-def _poor(rng: np.random.Generator) -> Case:
+def _poor(rng: np.random.Generator) -> Case | None:
     """Far open, fully tilted, wires against a lip or beside the middle."""
-    clamp = random_clamp(rng)
-    return Case(clamp, open_start(rng, Section(clamp, Cas())))
+    clamp = _random(rng)
+    return None if clamp is None else Case(clamp, open_start(rng, Section(clamp, Cas())))
 
 
 @MAKERS.family("equal clearances", _fitting)

@@ -66,12 +66,6 @@ class Valleys:
             bottom = further
         self.bottom = bottom
 
-    def column(self, row: int, x: float) -> int:
-        """Column in which a wire at x ends at one tilt."""
-        d = self.d[row]
-        j = min(max(int(self.x[row].searchsorted(x)), 1), len(d) - 1)
-        return int(self.bottom[row, j if d[j] < d[j - 1] else j - 1])
-
     def settle(self, rows: NDArray[np.intp], x: Array) -> NDArray[np.intp]:
         """Columns (m,) in which wires at x (m,) end at the tilts ``rows`` (m,)."""
         xs, d = self.x[rows], self.d[rows]
@@ -126,7 +120,7 @@ def _lowest(envelope: Envelope, tilt: float, width: float, x6: float, x7: float)
             for side in (range(_POINTS // 2, -1, -1), range(_POINTS // 2, _POINTS)):
                 place = x[w]
                 for k in side:
-                    column = valleys.column(k, place)
+                    column = int(valleys.settle(np.array([k]), np.array([place]))[0])
                     place = places[k, w] = float(valleys.x[k, column])
                     level[k] = max(level[k], valleys.d[k, column])
         level += envelope.lifted(tilts)

@@ -52,16 +52,11 @@ def count(n: int) -> int:
 
 
 def setting(
-    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES, **fixed: ArrayLike
+    rng: np.random.Generator, n: int, features: tuple[str, ...] = FEATURES
 ) -> tuple[Shapes, NDArray[np.intp], NDArray[np.str_]]:
     """Random shapes, the shape (n,) of each case, and the feature (n,) that it touches."""
-    return *shapes_for(rng, n, **fixed), rng.choice(features, n)
-
-
-def shapes_for(rng: np.random.Generator, n: int, **fixed: ArrayLike) -> tuple[Shapes, NDArray[np.intp]]:
-    """Random shapes for n cases, and the shape (n,) of each case."""
-    drawn = shapes(rng, count(n), **fixed)
-    return drawn, spread(n, len(drawn))
+    drawn = shapes(rng, count(n))
+    return drawn, spread(n, len(drawn)), rng.choice(features, n)
 
 
 def poses_from_axes(rng: np.random.Generator, centre: Any, direction: Any) -> Array:
@@ -160,13 +155,12 @@ def place(
     gap: Array,
     *,
     tilt: ArrayLike | None = None,
-    along: ArrayLike | None = None,
 ) -> Cases:
     """Put each wire at ``gap`` (n,) from its contact.
 
     ``tilt`` (n,) rad is the axis' lean out of the groove's direction within the plane square to the normal, by
-    default any; ``along`` (n,) in [-1, 1] is where on the axis it touches. Features that a wire can only touch with
-    its end get that end, and an axis that leads away.
+    default any; it touches anywhere on the axis. Features that a wire can only touch with its end get that end, and an
+    axis that leads away.
     """
     n = len(shape)
     r, half = np.asarray(shapes.r, Extended)[shape], np.asarray(shapes.length, Extended)[shape] / 2
@@ -177,7 +171,7 @@ def place(
     v = np.cross(nrm, u)
     lean = np.asarray(rng.uniform(-np.pi, np.pi, n) if tilt is None else tilt, Extended)
     d = np.cos(lean)[:, None] * u + np.sin(lean)[:, None] * v
-    t = half * np.asarray(rng.uniform(-1.0, 1.0, n) if along is None else along, Extended)
+    t = half * np.asarray(rng.uniform(-1.0, 1.0, n), Extended)
     away = np.asarray(rng.uniform(0.0, np.pi / 2, n), Extended)
     if tilt is None:
         ended = np.cos(away)[:, None] * d + np.sin(away)[:, None] * nrm
@@ -192,19 +186,13 @@ def place(
 
 
 def touching(
-    rng: np.random.Generator,
-    n: int,
-    shapes: Shapes,
-    gap: tuple[float, float],
-    *,
-    features: tuple[str, ...] = FEATURES,
-    tilt: tuple[float, ...] | None = None,
+    rng: np.random.Generator, n: int, shapes: Shapes, gap: tuple[float, float], *, tilt: tuple[float, ...] | None = None
 ) -> Cases:
-    """n cases on any of ``features``, at gaps of +-10^u of the wire's radius with u in ``gap``, or 0.
+    """n cases on any of `FEATURES`, at gaps of +-10^u of the wire's radius with u in ``gap``, or 0.
 
     ``tilt`` are the arguments of `powers` for the lean in rad, None for any lean.
     """
-    shape, feature = spread(n, len(shapes)), rng.choice(features, n)
+    shape, feature = spread(n, len(shapes)), rng.choice(FEATURES, n)
     off = shapes.r[shape] * powers(rng, n, *gap)
     contact = contact_on(rng, shapes, shape, feature)
     lean = None if tilt is None else powers(rng, n, *tilt)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.baselines import ContactModel, contact_model
+from clamp3d.baselines import contact_model
 from clamp3d.baselines.chords import chord_error
 from clamp3d.bench.stress.family import Family, Methods
 from clamp3d.bench.stress.poses import features, magnitudes
@@ -90,17 +90,12 @@ class SolidMethod:
         part = block(pair.groove, exact.point_on_groove[~ended])
         distance = np.full(len(cases), np.nan)
         if not ended.all():
-            distance[~ended] = fcl_model(self.name, part, pair.groove, self.settings).distances(pair, T[~ended])
+            scale = {key: 1.0 if key == "unit_angle" else pair.groove.radius for key in self.settings}
+            sizes = {key: value * scale[key] for key, value in self.settings.items()}
+            model = contact_model(self.name, {"P1": part}, **sizes, time_limit=60.0, progress=False)
+            distance[~ended] = model.distances(pair, T[~ended])
         bound = np.full(len(cases), self.bound(pair.groove) + FCL_ERROR)
         return Measured(distance, bound, ended, "the wire's end is nearest, which is flat in FCL")
-
-
-def fcl_model(
-    name: str, part: Solid, groove: SweptArc, settings: Mapping[str, float], time_limit: float = 60.0
-) -> ContactModel:
-    """The model of a part; ``settings`` but the angle in parts of the groove's radius."""
-    sizes = {key: value * (1.0 if key == "unit_angle" else groove.radius) for key, value in settings.items()}
-    return contact_model(name, {"P1": part}, **sizes, time_limit=time_limit, progress=False)
 
 
 def block(groove: SweptArc, points: Array) -> Solid:

@@ -17,7 +17,8 @@ MAKERS = Makers()
 @MAKERS.family("random")
 def _random(rng: np.random.Generator, n: int) -> Cases:
     """Any pose of any groove: parallel, tilted, crossing, clear, touching, deep."""
-    shapes, shape = draw.shapes_for(rng, n)
+    shapes = draw.shapes(rng, draw.count(n))
+    shape = draw.spread(n, len(shapes))
     size = (shapes.R + 0.3 * shapes.L)[shape][:, None]
     centre = rng.uniform(-1.5, 1.5, (n, 3)) * size
     direction = rng.normal(size=(n, 3)) * np.array([1.0, 1.0, 2.0])

@@ -11,7 +11,7 @@ import numpy as np
 from clamp3d.bench.stress.family import Family, Makers, Methods
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome, Wrong, score
 from clamp3d.bench.stress.poses import draw, features
-from clamp3d.bench.stress.poses.cases import Cases, Extended, Shapes, unit_rows
+from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
 from clamp3d.bench.stress.poses.family import METHODS as POSE_METHODS
 from clamp3d.bench.stress.poses.flat_truth import flat_truth
 from clamp3d.bench.stress.poses.truth import truth
@@ -78,9 +78,9 @@ def _discs(rng: np.random.Generator, n: int) -> Cases:
 
 def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
     """The interval in mm that holds the signed distance of case i."""
-    case = _alone(cases, i)
-    s, scene, T = case.shapes, float(case.scene()[0]), case.T_groove_wire[0]
-    R, half_angle, L, r, length = (float(column[0]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
+    case = cases.take([i])
+    k, s, scene, T = int(case.shape[0]), case.shapes, float(case.scene()[0]), case.T_groove_wire[0]
+    R, half_angle, L, r, length = (float(column[k]) for column in (s.R, s.half_angle, s.L, s.r, s.length))
     low, high = flat_truth(R, half_angle, L, r, length, T, NARROW * scene, most)
     rounding = 20.0 * NARROW * scene if high < -min(r, 0.5 * length) + _KNOWN * scene else 0.05 * NARROW * scene
     if low <= -min(r, 0.5 * length) + rounding:
@@ -91,13 +91,6 @@ def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]
         if deep <= -r:
             return deep - rounding, deep + rounding
     return low - rounding, high + rounding
-
-
-def _alone(cases: Cases, i: int) -> Cases:
-    """Case i with a table of shapes of its own: that of many cases takes longer to read than one truth to find."""
-    k, s = slice(cases.shape[i], cases.shape[i] + 1), cases.shapes
-    shapes = Shapes(s.R[k], s.half_angle[k], s.L[k], s.r[k], s.length[k], s.flat)
-    return replace(cases.take([i]), shapes=shapes, shape=np.zeros(1, np.intp))
 
 
 METHODS: Methods = {REFERENCE: POSE_METHODS[REFERENCE]}
@@ -111,15 +104,11 @@ class FlatFamily(Family):
 
     def truths(self, cases: Cases) -> Array:
         """Intervals (n, 2) in mm."""
-        return np.array([self.interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
-
-    def interval(self, cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]:
-        """The interval in mm that holds the truth of case i, of as many boxes as ``most``."""
-        return interval(cases, i, most)
+        return np.array([interval(cases, i, _BOXES) for i in range(len(cases))]).reshape(-1, 2)
 
     def difference(self, cases: Cases, truths: Array, i: int) -> float:
         """See `Family`: how far the interval is from a second, finer one."""
-        low, high = self.interval(cases, i)
+        low, high = interval(cases, i)
         return max(low - float(truths[i, 1]), float(truths[i, 0]) - high, 0.0) / float(cases.scene()[i])
 
     def judge(self, name: str, cases: Cases, truths: Array, answers: Answers) -> Outcome:
@@ -139,7 +128,7 @@ class FlatFamily(Family):
     def case(self, n: int, seed: int, i: int) -> str:
         """See `Family`."""
         cases = self.cases(n, seed)
-        low, high = self.interval(cases, i)
+        low, high = interval(cases, i)
         return f"{cases.snippet(i)}\n# truth: from {low!r} to {high!r} mm"
 
 

@@ -1,9 +1,10 @@
 """The truth of a case, found without the kernel: least signed distance of a moving point from the groove.
 
 Definition: ``min over |t| <= length/2 of sdf(c + t d) - r``, where ``sdf`` is the signed distance of a point from the
-groove's solid. Here ``sdf`` is put together from the boundary pieces of the section (arc, two rays) and the prism
-rule. Branch and bound with the proven slope bound of ``sdf`` along the axis finds the stretches that hold the minimum,
-so none deeper than 1e-6 of the scene (at 50 digits: of the groove's radius) can hide; golden section goes down in each:
+groove's solid. Here ``sdf`` is put together from the boundary pieces of the section (arc, two rays) and the prism rule;
+at 50 digits by complex numbers, a construction that shares nothing with the kernel's. Branch and bound with the proven
+slope bound of ``sdf`` along the axis finds the stretches that hold the minimum, so none deeper than 1e-6 of the scene
+(at 50 digits: of the groove's radius) can hide; golden section goes down in each:
 
 - `truth`: all cases at once in 80-bit floats (64-bit mantissa: about 2000 times finer than float64).
 - `truth_50_digits`: one case with mpmath at 50 digits.
@@ -11,13 +12,15 @@ so none deeper than 1e-6 of the scene (at 50 digits: of the groove's radius) can
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.bench.stress.digits import fifty_digits, golden, point_distance
 from clamp3d.bench.stress.poses.cases import Cases, Extended, unit_rows
+from clamp3d.errors import need
+from clamp3d.testing.bodies import groove_distance
 
 EXTENDED_WORKS = bool(np.finfo(Extended).eps < 1e-18)
 """Whether the platform's long double is wide enough for `truth`; if not, it calls `truth_50_digits` case by case."""
@@ -55,7 +58,7 @@ class _Scene:
         s = cases.shapes
         k = cases.shape
         self.R, self.a, self.L, self.r, length = (
-            np.asarray(v, Extended)[k] for v in (s.R, s.half_angle, s.L, s.r, s.length)
+            np.asarray(v[k], Extended) for v in (s.R, s.half_angle, s.L, s.r, s.length)
         )
         self.H, self.half = self.L / 2, length / 2
         self.sx, self.h = self.R * np.sin(self.a), -self.R * np.cos(self.a)
@@ -78,22 +81,7 @@ class _Scene:
     def sdf(self, i: NDArray[np.intp], t: NDArray[Any]) -> NDArray[Any]:
         """Signed distance of the axis points t (m,) of cases i (m,) from their grooves."""
         x, y, z = (self.c[i, k] + t * self.d[i, k] for k in range(3))
-        return point_sdf(x, y, z, self.R[i], self.sx[i], self.h[i], self.H[i])
-
-
-def point_sdf(x: Any, y: Any, z: Any, R: Any, sx: Any, h: Any, H: Any) -> NDArray[Any]:
-    """Signed distance of points from grooves with lips at (+-sx, h) and ends at +-H, in the numbers that are given."""
-    x = np.abs(x)
-    # Squares neither overflow nor vanish in the exponents of a long double.
-    rho = np.sqrt(x * x + y * y)
-    lip = np.sqrt((x - sx) ** 2 + (y - h) ** 2)
-    arc = np.where(x * -h + y * sx <= 0, np.abs(R - rho), lip)
-    ray = np.where(x >= sx, np.abs(y - h), lip)
-    inside = (y <= h) & (rho >= R)
-    g = np.where(inside, -1.0, 1.0) * np.minimum(arc, ray)
-    e = np.abs(z) - H
-    outside = np.sqrt(np.maximum(g, 0) ** 2 + np.maximum(e, 0) ** 2)
-    return np.asarray(np.where((g <= 0) & (e <= 0), np.maximum(g, e), outside))
+        return groove_distance(x, y, z, self.R[i], self.sx[i], self.h[i], self.H[i])
 
 
 def _brackets(
@@ -172,7 +160,11 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
 
     It is good to 1e-32 of the shortest length. Raises MissingLibraryError without mpmath.
     """
-    mp = fifty_digits()
+    need("mpmath", "an answer of 50 digits")
+    import mpmath
+
+    mp = mpmath.mp.clone()
+    mp.dps = 50
     k = int(cases.shape[i])
     s = cases.shapes
     R, a, L, r, length = (mp.mpf(float(v[k])) for v in (s.R, s.half_angle, s.L, s.r, s.length))
@@ -181,10 +173,18 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
     norm = mp.sqrt(mp.fsum(v * v for v in d))
     d = [v / norm for v in d]
     half = length / 2
-    point = point_distance(mp, R, a, L)
+    corner = mp.mpc(R * mp.cos(a), R * mp.sin(a))  # of the section, turned so that -y is real
 
     def sdf(t: Any) -> Any:
-        return point([c[j] + t * d[j] for j in range(3)])
+        x, y, z = (c[j] + t * d[j] for j in range(3))
+        point = mp.mpc(-y, abs(x))
+        to_lip = abs(point - corner)
+        to_arc = abs(abs(point) - R) if mp.arg(point) <= a else to_lip
+        to_ray = abs(point.real - corner.real) if point.imag >= corner.imag else to_lip
+        g, e = min(to_arc, to_ray), abs(z) - L / 2
+        if point.real >= corner.real and abs(point) >= R:
+            g = -g
+        return max(g, e) if g <= 0 and e <= 0 else mp.hypot(max(g, 0), max(e, 0))
 
     best = min(sdf(-half), sdf(half))
     goal = mp.mpf(10) ** -32 * min(half, R, L)  # a distance has slope 1: more digits than two floats can hold
@@ -198,5 +198,25 @@ def truth_50_digits(cases: Cases, i: int) -> Any:
         for j in range(_FILL + 1):
             before, after = max(j - 1, 0), min(j + 1, _FILL)
             if values[j] <= min(values[before], values[after]):
-                best = min(best, golden(mp, sdf, grid[before], grid[after], goal, enough=best))
+                best = min(best, _golden_50_digits(mp, sdf, grid[before], grid[after], goal, best))
     return best - r
+
+
+def _golden_50_digits(mp: Any, f: Callable[[Any], Any], lo: Any, hi: Any, goal: Any, enough: Any) -> Any:
+    """Least value of ``f`` seen by golden section from ``lo`` to ``hi`` down to a stretch of ``goal``.
+
+    f has a slope up to 1: it ends too when f cannot get below ``enough`` any more.
+    """
+    tau = (mp.sqrt(5) - 1) / 2
+    x, y = hi - tau * (hi - lo), lo + tau * (hi - lo)
+    fx, fy = f(x), f(y)
+    while hi - lo > goal and min(fx, fy) - (hi - lo) <= enough:
+        if fx < fy:
+            hi, y, fy = y, x, fx
+            x = hi - tau * (hi - lo)
+            fx = f(x)
+        else:
+            lo, x, fx = x, y, fy
+            y = lo + tau * (hi - lo)
+            fy = f(y)
+    return min(fx, fy)
