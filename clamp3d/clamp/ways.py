@@ -116,15 +116,13 @@ class Insertion:
 
     def way_out(self) -> tuple[Leg, ...]:
         """The first free way; empty if there is none, and `blocks` says why."""
-        for origin, length in self._exits(_HERE):
-            if self._is_free(_HERE, out(origin, length)):
-                return ((origin, length + SPARE),)
-        for origin, first in self._bends():
-            corner = out(origin, first)
+        bends: Iterator[tuple[Leg, ...]] = ((leg,) for leg in self._bends())
+        for legs in itertools.chain([()], bends):
+            corner = sum((out(*leg) for leg in legs), _HERE)
             for then, length in self._exits(corner):
-                is_square = float(out(then) @ out(origin)) == 0.0
+                is_square = all(float(out(then) @ out(origin)) == 0.0 for origin, _ in legs)
                 if is_square and self._is_free(corner, out(then, length)):
-                    return ((origin, first), (then, length + SPARE))
+                    return (*legs, (then, length + SPARE))
         return ()
 
     def blocks(self) -> tuple[Block, ...]:
