@@ -306,19 +306,6 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
     return normal, normal, t
 
 
-@inlined
-def left_of_disc(groove: Groove, rod: Rod, bound: float) -> Answer:
-    """What is left last of a cylinder that is wider than long, its middle, in the material."""
-    out = way_out(groove, rod.centre)
-    return Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound)
-
-
-@inlined
-def shrunk(rod: Rod) -> Rod:
-    """The capsule of what is left last of a cylinder that is longer than wide."""
-    return Rod(rod.centre, rod.axis, rod.e2, rod.r, rod.half - rod.r)
-
-
 @formula
 def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool, Answer, Vector]:
     """Whether what is left last of the cylinder is in the material; then answer and rate."""
@@ -326,9 +313,9 @@ def after_nothing_left(groove: Groove, rod: Rod, capsule: Answer) -> tuple[bool,
     if rod.half < rod.r:
         if features.section(groove, rod.centre.x, rod.centre.y)[0] > 0.0 or abs(rod.centre.z) > groove.H:
             return False, capsule, capsule.normal
-        answer = left_of_disc(groove, rod, bound)
-        return True, answer, answer.normal
-    left = shrunk(rod)
+        out = way_out(groove, rod.centre)
+        return True, Answer(out.distance - rod.half, out.point, out.normal, out.feature, 0.0, bound), out.normal
+    left = Rod(rod.centre, rod.axis, rod.e2, rod.r, rod.half - rod.r)  # the capsule of what is left
     lo, hi = features.clip(groove, rod, left.half)
     low, high = features.axis_point(rod, lo), features.axis_point(rod, hi)
     if lo > hi or not (features.is_behind_arc(groove, low.x, low.y) or features.is_behind_arc(groove, high.x, high.y)):

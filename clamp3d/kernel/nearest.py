@@ -176,22 +176,15 @@ def outside(groove: Groove, rod: Rod) -> Candidate:
 def at_end(groove: Groove, rod: Rod, ez: float, best: Candidate) -> Candidate:
     """The best so far, or a corner, an edge or the arc of the end in the plane z = ez."""
     circle = features.end_circle(groove, rod, ez)
-    is_asked = has_two_minima(rod, circle.p, circle.v)
+    # Whether the distance from the circle may have two minima. With one, and where it falls from no corner into the
+    # arc, none is on the arc.
+    is_asked = abs(circle.p) < rod.e2 and abs(rod.axis.z * circle.v) < rod.e2
     for side in (-1.0, 1.0):
         best, falls = features.on_corner(groove, rod, side, ez, best)
         is_asked = is_asked or falls
     if rod.centre.y + rod.half * abs(rod.axis.y) >= groove.h:
         best = features.on_end_edge(groove, rod, ez, best)
     return features.on_end_arc(groove, rod, circle, best) if is_asked else best
-
-
-@inlined
-def has_two_minima(rod: Rod, p: float, v: float) -> bool:
-    """Whether the distance from an end's circle may have two minima.
-
-    With one, and where it falls from no corner into the arc, none is on the arc.
-    """
-    return abs(p) < rod.e2 and abs(rod.axis.z * v) < rod.e2
 
 
 @inlined
