@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,7 +13,6 @@ from clamp3d.checks import instance
 from clamp3d.errors import InputError
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array, check_pose
-from clamp3d.geometry.primitives import Cylinder
 from clamp3d.geometry.shapes import Solid
 from clamp3d.kernel.contact_model import GroovePair
 
@@ -78,7 +78,7 @@ class PolytopeModel:
         instance("parts", parts, Mapping)
         self._parts = parts
         self._cut: dict[str, Polytopes] = {}
-        self._wires: dict[Cylinder, Wire] = {}
+        self._wire = functools.cache(Wire)
 
     @property
     def meshes_built(self) -> int:
@@ -106,12 +106,6 @@ class PolytopeModel:
         """Signed distances (n,) for poses (n, 4, 4); see `ContactModel`."""
         T_a_b = poses_of(pair, T_a_b)
         return self.polytopes(pair.a).distances(self._wire(pair.cylinder), T_a_b @ pair.T_b_cylinder)
-
-    def _wire(self, cylinder: Cylinder) -> Wire:
-        """FCL's cylinder of this size, made once."""
-        if cylinder not in self._wires:
-            self._wires[cylinder] = Wire(cylinder)
-        return self._wires[cylinder]
 
 
 class Meshes(PolytopeModel):

@@ -125,10 +125,10 @@ def _filled(edges: tuple[Segment | Arc, ...]) -> Array:
     """Corners (k, 2) of the outline with every groove closed by its mouth and every convex arc as fine chords."""
     corners: list[tuple[float, float]] = []
     for edge in edges:
-        corners.append(edge.start)
         if isinstance(edge, Arc) and edge.sweep > 0.0:
-            n = edge.chord_count(_BACK_ERROR)
-            corners += [edge.at(edge.start_angle + edge.sweep * i / n) for i in range(1, n)]
+            corners += edge.chords(_BACK_ERROR, edge.start)
+        else:
+            corners.append(edge.start)
     return np.array(corners)
 
 
