@@ -7,14 +7,13 @@ wait, which takes as much CPU again.
 
 from __future__ import annotations
 
-import importlib
 import os
-from typing import Any
 
 import numpy as np
 
 from clamp3d.bench.compare.methods import Prepared, Series, ready
 from clamp3d.bench.compare.scene import BLOCK, PAIR, WIRE, chord_error
+from clamp3d.geometry.manifolds import as_manifold
 from clamp3d.geometry.meshing import mesh
 from clamp3d.geometry.pose import Array
 
@@ -25,17 +24,11 @@ _THIN = 1e-8  # mm
 def _make(unit_angle: float) -> Prepared:
     if hasattr(os, "sched_setaffinity"):  # before its threads start
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    manifold3d: Any = importlib.import_module("manifold3d")
-
-    def manifold(V: Array, F: Any) -> Any:
-        V, F = np.ascontiguousarray(V, float), np.ascontiguousarray(F, np.uint64)
-        return manifold3d.Manifold(manifold3d.Mesh64(vert_properties=V, tri_verts=F))
-
     block_mesh, half = mesh(BLOCK, chord_error(unit_angle) * (1.0 + 1e-9)), 0.5 * WIRE.length
-    part = manifold(block_mesh.vertices @ PAIR.T_a_groove[:3, :3], block_mesh.faces)
-    wire = manifold(
+    part = as_manifold(block_mesh.vertices @ PAIR.T_a_groove[:3, :3], block_mesh.faces)
+    wire = as_manifold(
         np.array([(0.0, 0.0, -half), (_THIN, 0.0, -half), (0.0, _THIN, -half), (0.0, 0.0, half)]),
-        [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
+        np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]),
     )
 
     def one(T: Array) -> float:

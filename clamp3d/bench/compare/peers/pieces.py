@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from clamp3d.bench.compare.scene import DEPTH, GROOVE, WIDTH, WIRE
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, translation
 from clamp3d.geometry.profile import chord_count
 
 THICKNESS = 3.0
@@ -47,8 +47,7 @@ def boxes(unit_angle: float) -> list[tuple[Array, Array]]:
         placed.append((np.array([width, THICKNESS, GROOVE.length]), T))
     side, face = _MOUTH
     for s in (-1.0, 1.0):
-        T = np.eye(4)
-        T[:2, 3] = s * 0.5 * (side + 0.5 * WIDTH), face - 0.5 * DEPTH
+        T = translation(s * 0.5 * (side + 0.5 * WIDTH), face - 0.5 * DEPTH, 0.0)
         placed.append((np.array([0.5 * WIDTH - side, DEPTH, GROOVE.length]), T))
     return placed
 
