@@ -22,7 +22,6 @@ from clamp3d.bench.stress.family import Family
 from clamp3d.bench.stress.outcome import REFERENCE, Outcome, Wrong, examples, score
 from clamp3d.bench.stress.worker import Answers, Measured, Measures, Rows, run_here
 from clamp3d.clamp.assemble import STEP, TILT_STEP
-from clamp3d.clamp.dimensions import Clamp
 from clamp3d.clamp.equilibria import equilibria
 from clamp3d.clamp.final_state import solve_final_state
 from clamp3d.clamp.section import Section
@@ -54,19 +53,18 @@ class Solver:
 
     measures: Measures = "depth"
 
-    def __init__(self, solve: Callable[[Case], Rest], bound: Callable[[Clamp], float]) -> None:
+    def __init__(self, solve: Callable[[Case], Rest], bound: float) -> None:
         self._solve, self._bound = solve, bound
         self.rests: dict[int, Rest] = {}
 
     def measure(self, cases: Assemblies) -> Measured:
         """Distances between the splints."""
-        distance, bound = np.empty(len(cases)), np.empty(len(cases))
+        distance = np.empty(len(cases))
         for k, number in enumerate(cases.shape):
             case = cases.cases[number]
             self.rests[int(number)] = rest = self._solve(case)
             distance[k] = Section(case.clamp, Cas()).splint_distance(rest.q)
-            bound[k] = self._bound(case.clamp)
-        return Measured(distance, bound)
+        return Measured(distance, np.full(len(cases), self._bound))
 
 
 def _exact(case: Case) -> Rest:
@@ -82,11 +80,11 @@ def _stepped(case: Case) -> Rest:
 METHODS: dict[str, tuple[str, Callable[[], Solver]]] = {
     "cas": (
         "closed forms of the arc groove; its bound is that of rounding; of a clamp the exact solver, 1e-8 mm",
-        lambda: Solver(_exact, lambda clamp: EXACT),
+        lambda: Solver(_exact, EXACT),
     ),
     "stepped": (
         "of a clamp the paper's search: the down splint moves by 1/3 mm and 1 degree; its bound is the step",
-        lambda: Solver(_stepped, lambda clamp: STEP),
+        lambda: Solver(_stepped, STEP),
     ),
 }
 

@@ -51,10 +51,6 @@ class Shapes:
         """Wire of row k."""
         return (Cylinder if self.flat else Capsule)(float(self.r[k]), float(self.length[k]))
 
-    def cylinder(self, k: int) -> Cylinder:
-        """Wire of row k with flat ends."""
-        return Cylinder(float(self.r[k]), float(self.length[k]))
-
     def snippet(self, k: int) -> list[str]:
         """Python lines that make the groove and the wire of row k, bit by bit the same numbers."""
         shapes = {"groove": self.groove(k), "wire": self.wire(k)}
@@ -62,7 +58,8 @@ class Shapes:
 
     def pair(self, k: int) -> GroovePair:
         """Row k as a pair that a contact model takes; both parts have their feature's own frame."""
-        return GroovePair("P1", "P6", self.groove(k), np.eye(4), self.cylinder(k), np.eye(4))
+        cylinder = Cylinder(float(self.r[k]), float(self.length[k]))
+        return GroovePair("P1", "P6", self.groove(k), np.eye(4), cylinder, np.eye(4))
 
 
 @dataclass(frozen=True, slots=True)

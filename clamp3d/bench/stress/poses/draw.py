@@ -36,8 +36,7 @@ def shapes(rng: np.random.Generator, k: int, **fixed: ArrayLike) -> Shapes:
         "r": R * rng.uniform(0.3, 0.999, k),
         "length": R * 10.0 ** rng.uniform(-0.5, 1.5, k),
     }
-    columns.update({name: np.broadcast_to(np.asarray(value, np.float64), (k,)) for name, value in fixed.items()})
-    arrays: dict[str, Any] = {name: np.ascontiguousarray(value) for name, value in columns.items()}
+    arrays: dict[str, Any] = {name: np.array(value, np.float64) for name, value in (columns | fixed).items()}
     return Shapes(**arrays)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from clamp3d.baselines import contact_model
 from clamp3d.baselines.chords import chord_error
 from clamp3d.bench.stress.family import Family, Methods
-from clamp3d.bench.stress.poses import features, magnitudes
+from clamp3d.bench.stress.poses import features
 from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, truth, truth_50_digits
 from clamp3d.bench.stress.worker import Measured, Measures, run_here
@@ -167,4 +167,4 @@ class PoseFamily(Family):
         return f"{cases.snippet(i)}\n# truth: {float(truth_50_digits(cases, i))!r} mm"
 
 
-POSES = {name: PoseFamily(name, *maker) for name, maker in (features.MAKERS | magnitudes.MAKERS).items()}
+POSES = {name: PoseFamily(name, *maker) for name, maker in features.MAKERS.items()}

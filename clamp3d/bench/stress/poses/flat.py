@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -93,13 +93,10 @@ def interval(cases: Cases, i: int, most: int = MAX_BOXES) -> tuple[float, float]
     return low - rounding, high + rounding
 
 
-METHODS: Methods = {REFERENCE: POSE_METHODS[REFERENCE]}
-
-
 class FlatFamily(Family):
     """A kind of difficulty of flat-ended cylinders. A truth is an interval that holds the signed distance."""
 
-    methods = METHODS
+    methods: ClassVar[Methods] = {REFERENCE: POSE_METHODS[REFERENCE]}
     truth_error = 1e-12
 
     def truths(self, cases: Cases) -> Array:
