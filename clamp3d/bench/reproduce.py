@@ -130,21 +130,20 @@ def reproduce(progress: Callable[[str], None] = lambda message: None) -> Reprodu
     clamp = load_clamp("reference")
     table4: list[DistanceRow] = []
     table5: list[WorkRow] = []
-    exact: Assembly | None = None
+    runs: dict[tuple[Solver, float | None], Assembly] = {}
     solvers: tuple[Solver, ...] = ("stepped", "exact")
     for solver in solvers:
         for unit in (None, *published.CHORD_DISTANCES):
             progress(f"Table 4: {'cas' if unit is None else f'chords of {unit:g} deg'}, {solver}")
             model = Cas() if unit is None else Chords(math.radians(unit))
-            run = assemble(clamp, model, solver=solver)
-            exact = run if solver == "exact" and unit is None else exact
+            run = runs[solver, unit] = assemble(clamp, model, solver=solver)
             theirs = published.CAS_DISTANCE if unit is None else published.CHORD_DISTANCES[unit]
             table4.append(DistanceRow(run.method, solver, unit, run.distance, theirs))
             grooves = [pair for pair in groove_pairs(clamp).values() if pair.a in ("P1", "P2")]
             segments = 4 if isinstance(model, Cas) else model.segments(grooves)
             work = run.work
             table5.append(WorkRow(run.method, solver, unit, work.motion_steps, work.contact_queries, segments))
-    assert exact is not None
+    exact = runs["exact", None]
     progress("Table 4: image detection")
     trials = tuple(float(v) for v in image_study(exact).trials)
     return Reproduction(

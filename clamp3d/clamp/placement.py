@@ -29,7 +29,7 @@ from clamp3d.clamp.dimensions import Clamp, PartName
 from clamp3d.clamp.final_state import TOLERANCE, solve_final_state
 from clamp3d.clamp.parts import groove_pairs
 from clamp3d.clamp.result import Assembly
-from clamp3d.clamp.section import SIZE, WIRES, Section
+from clamp3d.clamp.section import SIZE, SPLINTS, WIRES, Section
 from clamp3d.clamp.status import closing_status
 from clamp3d.errors import InputError, NotClampedError, SolverError
 from clamp3d.geometry.pose import Array, inverse
@@ -245,8 +245,7 @@ def close_on(final: Assembly, wire: PartName, turns: Array) -> tuple[Array, NDAr
     poses[:, :3, :3] = Rotation.from_euler("ZX", turns).as_matrix() @ poses[0, :3, :3]
     opening, in_grooves = np.zeros(len(turns)), np.ones(len(turns), dtype=bool)
     pairs = groove_pairs(final.clamp)
-    splints: tuple[tuple[PartName, float], ...] = (("P1", 1.0), ("P2", -1.0))
-    for splint, up in splints:
+    for splint, up in zip(SPLINTS, (1.0, -1.0), strict=True):
         pair = pairs[splint, wire]
         T_groove_world = inverse(final.T_world(splint) @ pair.T_a_groove)
         travel, feature = _approach(pair, T_groove_world @ poses @ pair.T_b_cylinder, up * T_groove_world[:3, 2])
