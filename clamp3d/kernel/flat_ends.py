@@ -20,14 +20,7 @@ from clamp3d.kernel import features
 from clamp3d.kernel.edges import Edge, cylinder_distance, from_axis, on_arc, on_line
 from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.jit import formula, inlined
-from clamp3d.kernel.nearest import (
-    UNIT,
-    Answer,
-    inside,
-    inside_rate,
-    mixture,
-    way_out,
-)
+from clamp3d.kernel.nearest import UNIT, Answer, inside, inside_rate, mixture, way_out
 from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus, times
 
 
@@ -240,8 +233,7 @@ def best_point(groove: Groove, rod: Rod, search: Search) -> Search:
     search = on_edge(rod, Vector(-s, h, 0.0), along_z, -H, H, features.LIP_M, search)
     search = on_edge(rod, Vector(s, h, 0.0), along_z, -H, H, features.LIP_N, search)
     far = rod.half * abs(d.z) + rod.r * math.sqrt(rod.e2)
-    for k in range(2):
-        end = 1.0 if k == 0 else -1.0
+    for end in (1.0, -1.0):
         gap = end * c.z - far - H
         if end * c.z + far < H or (gap > 0.0 and gap > search.limit):
             continue

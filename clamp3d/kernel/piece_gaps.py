@@ -129,8 +129,7 @@ def on_back_of_arc(groove: Groove, rod: Rod, best: Candidate) -> Candidate:
 def on_edges(groove: Groove, rod: Rod, piece: int, best: Candidate) -> Candidate:
     """The best so far, or the point of the edges and corners of a piece that is nearest to the axis' inside."""
     is_flat, is_end = piece in (FACE_M, FACE_N), piece >= END_BELOW
-    for k in range(2):
-        side = -1.0 if k == 0 else 1.0
+    for side in (-1.0, 1.0):
         if not is_end and not (is_flat and side != side_of(piece, 0.0)):
             best = features.on_lip(groove, rod, side, best)
         if is_end and side != end_of(piece):
@@ -141,8 +140,7 @@ def on_edges(groove: Groove, rod: Rod, piece: int, best: Candidate) -> Candidate
         if piece != ARC_SURFACE:
             edge = features.on_end_edge(groove, rod, ez, best)
             best = edge if is_end or edge.point.x * side_of(piece, 0.0) > 0.0 else best
-        for j in range(2):
-            corner = -1.0 if j == 0 else 1.0
+        for corner in (-1.0, 1.0):
             if not (is_flat and corner != side_of(piece, 0.0)):
                 best, _ = features.on_corner(groove, rod, corner, ez, best)
     return best
