@@ -16,7 +16,7 @@ _MOST_SAMPLES = 64
 """Corners of a surface that are looked at to tell whether it lies in another."""
 
 _FEW = 8
-"""Points up to which the sum over all triangles is quicker than libigl, which first builds a tree of them."""
+"""Points up to which the sum over all triangles for each is quicker than to build a tree of them first."""
 
 
 def volume(vertices: Array, faces: Faces) -> float:
@@ -68,21 +68,12 @@ def winding_numbers(vertices: Array, faces: Faces, points: Array, *, rounded: bo
     >>> winding_numbers(corners, faces, np.array([[0.1, 0.2, 0.3], [1.0, 1.0, 1.0]])).round(12)
     array([1., 0.])
     """
-    if len(points) <= _FEW:
-        return np.array([_solid_angles(vertices[faces] - point).sum() for point in points]) / (4.0 * np.pi)
     import igl
 
+    if len(points) <= _FEW:
+        return np.array([igl.winding_number(vertices, faces, point) for point in points])
     numbers = igl.fast_winding_number if rounded else igl.winding_number
     return np.asarray(numbers(vertices, faces, np.ascontiguousarray(points)))
-
-
-def _solid_angles(triangles: Array) -> Array:
-    """Solid angle (m,) of triangles (m, 3, 3) seen from the origin (van Oosterom & Strackee 1983, equation 8)."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    size_a, size_b, size_c = np.linalg.norm(triangles, axis=2).T
-    ab, bc, ca = (np.einsum("ij,ij->i", p, q) for p, q in ((a, b), (b, c), (c, a)))
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-    return np.asarray(2.0 * np.arctan2(volume, size_a * size_b * size_c + ab * size_c + bc * size_a + ca * size_b))
 
 
 def sampled(corners: Array) -> Array:
