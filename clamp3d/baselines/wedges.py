@@ -16,7 +16,7 @@ from clamp3d.baselines.model import check_unit_angle
 from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.profile import Arc, Segment, chord_count
+from clamp3d.geometry.profile import Arc, Segment, chord_count, turns
 from clamp3d.geometry.shapes import Solid
 
 _BACK_ERROR = 0.01
@@ -134,11 +134,7 @@ def _filled(edges: tuple[Segment | Arc, ...]) -> Array:
 
 def _inward_corners(polygon: Array) -> list[float]:
     """First coordinates of the corners where the outline turns inward."""
-    before = polygon - np.roll(polygon, 1, axis=0)
-    after = np.roll(polygon, -1, axis=0) - polygon
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    scale = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return [float(x) for x in polygon[turn < -_SAME * scale, 0]]
+    return [float(x) for x in polygon[turns(polygon) < -_SAME, 0]]
 
 
 def _mouth(arc: Arc) -> tuple[float, float]:

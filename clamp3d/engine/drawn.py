@@ -13,7 +13,7 @@ from clamp3d.engine.convex import Convex, Rod
 from clamp3d.engine.hull import STRAIGHT, Hull, hull, prism
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, cross, to_source, to_target, translation
-from clamp3d.geometry.profile import Arc, Profile
+from clamp3d.geometry.profile import Arc, Profile, turns
 from clamp3d.geometry.shapes import Solid
 
 _TANGENTS = 12
@@ -45,10 +45,8 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
     if circle is not None:
         return [((Rod(circle.radius, body.length, _pose(body, circle.centre)),), [])]
     corners = np.array([edge.start for edge in body.profile.edges])
-    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    straight = STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    if (turn < -straight).any():
+    turn = turns(corners)
+    if (turn < -STRAIGHT).any():
         return None
     pieces: list[tuple[tuple[Convex, ...], list[Bore]]] = []
     grooves = []
@@ -59,7 +57,7 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
             grooves.append(Bore(arc.radius, 0.5 * abs(arc.sweep), body.length, T))
         else:
             pieces.append(((Rod(arc.radius, body.length, _pose(body, arc.centre)), _beyond_chord(body, arc)), []))
-    if (turn > straight).any():
+    if (turn > STRAIGHT).any():
         pieces.insert(0, ((prism(corners, body.start, body.end, body.frame),), grooves))
     elif grooves:
         return None

@@ -14,6 +14,7 @@ from clamp3d.engine.hull import hull
 from clamp3d.engine.surface import Surface
 from clamp3d.fit.features import FitResult, FittedSurface
 from clamp3d.geometry.pose import Array, to_source, to_target, translation
+from clamp3d.geometry.triangles import distances_from_segments
 
 Faces = NDArray[np.int64]
 
@@ -171,10 +172,7 @@ def _on_cylinder(points: Array, radius: float, error: float) -> bool:
 def _nearest_to_axis(flat: Array) -> tuple[Array, Array]:
     """Least distance (k,) of triangles (k, 3, 2), and of their edges (k, 3), from the origin of their plane."""
     a, b = flat, np.roll(flat, -1, axis=1)
-    ab = b - a
-    square = np.maximum(np.einsum("ijk,ijk->ij", ab, ab), 1e-300)
-    t = np.clip(-np.einsum("ijk,ijk->ij", a, ab) / square, 0.0, 1.0)
-    edges = np.linalg.norm(a + t[..., None] * ab, axis=2)
+    edges = distances_from_segments(np.zeros(2), a, b)
     cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     encloses = (cross > 0.0).all(axis=1) | (cross < 0.0).all(axis=1)
     return np.where(encloses, 0.0, edges.min(axis=1)), edges

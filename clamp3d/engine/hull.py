@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from clamp3d.geometry.mesh import edges_of, slivers_of
 from clamp3d.geometry.pose import Array
+from clamp3d.geometry.profile import turns
 from clamp3d.geometry.triangles import normals_and_areas
 
 MEMBER = 1e-9
@@ -36,12 +38,9 @@ class Hull:
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Corner numbers (k, 2) of the edges; those between two triangles of one flat face are left out."""
-        F, V = self.faces, self.vertices
-        normal, _ = normals_and_areas(V[F])
-        both = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        order = np.lexsort((both[:, 1], both[:, 0]))
-        pairs, owner = both[order].reshape(-1, 4)[:, :2], (order // 3).reshape(-1, 2)
-        bent = np.linalg.norm(np.cross(normal[owner[:, 0]], normal[owner[:, 1]]), axis=1) > 1e-10
+        pairs, owner, _ = edges_of(self.faces, 2)
+        normal = normals_and_areas(self.vertices[self.faces])[0][owner]
+        bent = np.linalg.norm(np.cross(normal[:, 0], normal[:, 1]), axis=1) > 1e-10
         return np.asarray(pairs[bent])
 
     def support(self, n: Array) -> Array:
@@ -105,9 +104,7 @@ def hull(points: Array) -> Hull:
 
 def prism(corners: Array, start: float, end: float, frame: Array) -> Hull:
     """A convex outline (k, 2), anticlockwise, drawn from ``start`` to ``end`` mm along z of ``frame`` (3, 3)."""
-    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    corners = corners[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] > STRAIGHT * size]
+    corners = corners[turns(corners) > STRAIGHT]
     n = len(corners)
     ends = [np.column_stack([corners, np.full(n, z)]) for z in (start, end)]
     vertices = np.vstack(ends) @ frame.T
@@ -136,12 +133,9 @@ def hull_error(vertices: Array, faces: NDArray[np.int64]) -> float:
     within h / cos t of z, and cos t is the depth of c below the plane over the distance of c and z.
     """
     scale = float(np.abs(vertices).max())
-    corners = vertices[faces]
-    sides = np.roll(corners, -1, axis=1) - corners
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    twice_area, longest = np.linalg.norm(normal, axis=1), np.linalg.norm(sides, axis=2).max(axis=1)
-    flat = twice_area > _SLIVER * scale * longest  # others have no plane to speak of
-    normal, corner = normal[flat] / twice_area[flat, None], corners[flat, 0]
+    flat = ~slivers_of(vertices, faces, _SLIVER * scale)  # others have no plane to speak of
+    corners = vertices[faces[flat]]
+    normal, corner = normals_and_areas(corners)[0], corners[:, 0]
     few = np.unique(np.arange(64) * 2654435761 % max(1, len(normal)))  # far apart, in no step with the rings of a mesh
     offset = np.einsum("ij,ij->i", normal, corner)
     for rows in (few, slice(None)):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clamp3d.files.solid import BrepSolid
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid
 
 if TYPE_CHECKING:
@@ -62,7 +62,8 @@ def relation(a: Part, b: Part) -> Relation | None:
         for p, q in ((a, b), (b, a))
         for pin in round_faces(p.shape)
         for hole in round_faces(q.shape)
-        if hole.is_hole and not pin.is_hole and _stands_in(_placed(pin, p), _placed(hole, q))
+        if hole.is_hole and not pin.is_hole
+        if _stands_in(to_target(p.T_world, pin.ends), to_target(q.T_world, hole.ends))
     ]
     if not fits:
         return None
@@ -71,10 +72,6 @@ def relation(a: Part, b: Part) -> Relation | None:
         if low * radius < overlap <= high * radius:
             return Relation(kind, max(0.0, overlap))
     return None
-
-
-def _placed(face: RoundFace, part: Part) -> Array:
-    return face.ends @ part.T_world[:3, :3].T + part.T_world[:3, 3]
 
 
 def _stands_in(pin: Array, hole: Array) -> bool:

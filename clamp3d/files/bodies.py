@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d.checks import short
 from clamp3d.errors import InputError
-from clamp3d.geometry.mesh import Mesh, make_mesh
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.mesh import Mesh, appended, make_mesh
+from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape
 
 MOST_BODIES = 20_000
@@ -121,13 +121,8 @@ class Reading:
         """All bodies, each at its place, as one mesh in mm."""
         if len(self.bodies) == 1 and np.array_equal(self.bodies[0].T, np.eye(4)):
             return self.bodies[0].mesh
-        import trimesh  # takes longer to load than most meshes to read
-
-        vertices, faces = trimesh.util.append_faces(
-            [body.mesh.vertices @ body.T[:3, :3].T + body.T[:3, 3] for body in self.bodies],
-            [body.mesh.faces for body in self.bodies],
-        )
-        mesh = make_mesh(vertices, faces, name=name)
+        placed = [to_target(body.T, body.mesh.vertices) for body in self.bodies]
+        mesh = make_mesh(*appended(placed, [body.mesh.faces for body in self.bodies]), name=name)
         return replace(mesh, notes=(*self.notes, *mesh.notes))
 
 

@@ -25,7 +25,7 @@ from clamp3d.files.bodies import Reading
 from clamp3d.files.formats import UNITS_MM
 from clamp3d.files.placing import Placer
 from clamp3d.files.worker import named_file
-from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.mesh import IntArray, appended
 from clamp3d.geometry.pose import UNIT_TOLERANCE, Array
 
 _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -184,8 +184,7 @@ class _Mesh:
             if piece.faces.max() >= len(piece.vertices):
                 raise InputError(f"face index {piece.faces.max()} is out of range for {len(piece.vertices)} vertices")
         vertices = [np.asarray(piece.vertices) / n for piece, n in zip(self.pieces, self._divisors, strict=True)]
-        V, F = trimesh.util.append_faces(vertices, [piece.faces for piece in self.pieces])
-        return np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+        return appended(vertices, [np.asarray(piece.faces, dtype=np.int64) for piece in self.pieces])
 
 
 def _simplify(tree: dict[str, Any], meshes: dict[int, _Mesh]) -> None:

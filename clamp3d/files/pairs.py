@@ -26,7 +26,7 @@ from clamp3d.files.open_cascade import (
     volumes_of,
 )
 from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of
-from clamp3d.geometry.mesh import IntArray
+from clamp3d.geometry.mesh import IntArray, appended
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import distances_from_segments, edge_middles, halves, normals_and_areas
 
@@ -250,12 +250,8 @@ def _joined(side: list[Border]) -> Border:
     """The samples of some faces as one."""
     if not side:
         return Border(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), np.empty(0))
-    starts = np.cumsum([0, *(len(border.points) for border in side[:-1])])
-    return Border(
-        np.vstack([border.points for border in side]),
-        np.vstack([border.triangles + start for border, start in zip(side, starts, strict=True)]),
-        np.concatenate([border.errors for border in side]),
-    )
+    mesh = appended([border.points for border in side], [border.triangles for border in side])
+    return Border(*mesh, np.concatenate([border.errors for border in side]))
 
 
 @lru_cache(maxsize=512)

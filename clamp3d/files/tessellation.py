@@ -12,8 +12,8 @@ import numpy as np
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
-from clamp3d.geometry.mesh import IntArray
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.mesh import IntArray, appended
+from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
 
 ANGLE = 0.35
@@ -84,21 +84,20 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
         if worst <= chord or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
             break
     corners, triples, numbers, errors = [], [], [], []
-    count = 0
     for k, (face, (points, triangles, uv)) in enumerate(zip(faces, meshes, strict=True)):
         if not len(triangles):
             continue
         deviation = np.maximum(_deviation(face, form, k, points, triangles, uv), SAMPLED * overlooked[k])
         corners.append(points)
-        triples.append(triangles + count)
-        count += len(points)
+        triples.append(triangles)
         numbers.append(np.full(len(triangles), k))
         errors.append(np.maximum(deviation, border_sag(face, points, triangles)))
     if not corners:
         raise Clamp3dError("Open CASCADE makes no triangles of it")
     # Faces that share an edge have the same points on it, so equal coordinates are one vertex.
-    vertices, index = np.unique(np.concatenate(corners), axis=0, return_inverse=True)
-    F = index.reshape(-1)[np.concatenate(triples)]
+    points, triangles = appended(corners, triples)
+    vertices, index = np.unique(points, axis=0, return_inverse=True)
+    F = index.reshape(-1)[triangles]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
@@ -110,8 +109,7 @@ def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
     if triangulation is None:
         raise Clamp3dError(f"Open CASCADE makes no triangles of face {number + 1}")
     count = range(1, triangulation.NbNodes() + 1)
-    T = matrix(place)
-    points = np.array([triangulation.Node(i).Coord() for i in count]) @ T[:3, :3].T + T[:3, 3]
+    points = to_target(matrix(place), np.array([triangulation.Node(i).Coord() for i in count]))
     uv = np.array([triangulation.UVNode(i).Coord() for i in count])
     triangles = np.array([triangulation.Triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)]) - 1
     if face.Orientation() == occ.TopAbs_Orientation.TopAbs_REVERSED:

@@ -20,9 +20,10 @@ from clamp3d.checks import shown
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Body, Reading
 from clamp3d.files.formats import UNITS_MM
-from clamp3d.geometry.mesh import IntArray, edges_of, make_mesh
+from clamp3d.geometry.mesh import IntArray, appended, edges_of, make_mesh
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
+from clamp3d.geometry.triangles import normals_and_areas
 
 _FOLDED = 1e-6
 """1 less the cosine of the angle (0.08 deg) to which two faces that share an edge are one on the other."""
@@ -72,8 +73,7 @@ def _arrays(path: Path) -> tuple[Array, IntArray]:
         raise InputError("no triangles in the file")
     if read < announced:
         raise InputError(f"the file is damaged: it announces {announced} faces, {read} were read")
-    V, F = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
-    vertices, faces = np.asarray(V, dtype=np.float64), np.asarray(F, dtype=np.int64)
+    vertices, faces = appended([np.asarray(mesh.vertices) for mesh in meshes], [mesh.faces for mesh in meshes])
     if read > announced:  # some faces have more than three corners
         _require_no_folds(vertices, faces)
     return vertices, faces
@@ -92,12 +92,9 @@ def _require_no_folds(vertices: Array, faces: IntArray) -> None:
     trimesh cuts faces with many corners into fans from the first one: of a face with a notch some lie beside it.
     """
     _, pairs, _ = edges_of(faces, 2)
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
     with np.errstate(all="ignore"):
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        folds = (normal[pairs[:, 0]] * normal[pairs[:, 1]]).sum(axis=1) < -1.0 + _FOLDED
-    if folds.any():
+        normal = normals_and_areas(vertices[faces])[0][pairs]
+    if ((normal[:, 0] * normal[:, 1]).sum(axis=1) < -1.0 + _FOLDED).any():
         raise InputError(
             "a face folds back onto its neighbour, as faces with notches do when they are cut into triangles: "
             "export it as triangles"

@@ -13,7 +13,7 @@ from clamp3d.files.faces import CYLINDER, KINDS, PLANE
 from clamp3d.files.solid import BrepSolid
 from clamp3d.fit.axis import Axis, covered, frame, upward
 from clamp3d.fit.features import FitResult, result_of
-from clamp3d.geometry.mesh import IntArray, Mesh
+from clamp3d.geometry.mesh import Mesh, appended, edges_of
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 _SAME = 1e-6
@@ -29,7 +29,7 @@ def fit_solid(solid: BrepSolid) -> FitResult:
 def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, dict[str, Any]]], list[str]]:
     """The mesh of all bodies; for each cylindrical feature its sense (1: convex) and values; notes on other faces."""
     vertices, faces, features, others = [], [], [], Counter[str]()
-    n = m = 0
+    count = 0
     for body in reading.bodies:
         solid = body.shape
         assert isinstance(solid, BrepSolid)
@@ -38,13 +38,13 @@ def cad_features(reading: Reading, name: str) -> tuple[Mesh, list[tuple[float, d
         for group in _groups(solid):
             rows = np.flatnonzero(np.isin(solid.face, group))
             values = _values(body, solid, group[0], placed[solid.mesh.faces[rows]])
-            features.append((float(solid.surfaces.sense[group[0]]), values | {"faces": rows + m}))
+            features.append((float(solid.surfaces.sense[group[0]]), values | {"faces": rows + count}))
         vertices.append(placed)
-        faces.append(solid.mesh.faces + n)
-        n, m = n + len(placed), m + len(solid.mesh.faces)
+        faces.append(solid.mesh.faces)
+        count += len(solid.mesh.faces)
     closed = all(body.mesh.watertight for body in reading.bodies)
     rounding = max(body.mesh.rounding for body in reading.bodies)
-    mesh = Mesh(name, np.concatenate(vertices), np.concatenate(faces), closed, rounding)
+    mesh = Mesh(name, *appended(vertices, faces), closed, rounding)
     words = [f"{count} {'free-form' if kind == 'other' else kind}" for kind, count in sorted(others.items())]
     return mesh, features, [*reading.notes, *([f"faces that are no cylinders: {', '.join(words)}"] if words else [])]
 
@@ -75,7 +75,7 @@ def _values(body: Body, solid: BrepSolid, face: int, corners: Array) -> dict[str
     """The values of a `FittedSurface` but its ``faces``, from the triangles (m, 3, 3) on the cylinder of a face."""
     point, *_, direction = solid.surfaces.frame[face]
     radius = float(solid.surfaces.size[face, 0])
-    axis = Axis(body.T[:3, :3] @ point + body.T[:3, 3], upward(body.T[:3, :3] @ direction), radius)
+    axis = Axis(to_target(body.T, point), upward(body.T[:3, :3] @ direction), radius)
     x, y, z = np.moveaxis(to_source(frame(axis, 0.0, 0.0), corners), -1, 0)
     angle = np.unwrap(np.arctan2(x, -y), axis=1)
     middle, half = covered(angle, _SAME)
@@ -103,9 +103,7 @@ def _values(body: Body, solid: BrepSolid, face: int, corners: Array) -> dict[str
 def _strays(corners: Array, half: float, length: float) -> tuple[float, float]:
     """How far the border strays from the ends of the arc (rad) and of the length (mm), beside these ends."""
     points, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    F: IntArray = number.reshape(-1, 3)
-    sides, count = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
-    ends = points[sides[count == 1]]
+    ends = points[edges_of(number.reshape(-1, 3), 1)[0]]
     along = np.abs(np.diff(ends[:, :, 2], axis=1)[:, 0]) > 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     z, angle = np.abs(ends[:, :, 2]), np.abs(np.arctan2(ends[:, :, 0], -ends[:, :, 1]))
     rounds = z[~along & (z.min(axis=1) > 0.5 * _NEAR_END * length)]

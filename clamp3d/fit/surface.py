@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from clamp3d.fit.axis import Axis
-from clamp3d.geometry.mesh import IntArray, Mesh
+from clamp3d.geometry.mesh import IntArray, Mesh, edges_of
 from clamp3d.geometry.pose import Array
+from clamp3d.geometry.triangles import normals_and_areas
 
 BoolArray = NDArray[np.bool_]
 
@@ -29,17 +29,11 @@ class Surface:
         # The normals of slivers are rounding.
         self.rows = np.flatnonzero(~mesh.slivers)
         self.V, self.F = mesh.vertices, mesh.faces[self.rows]
-        triangles = trimesh.Trimesh(self.V, self.F, process=False, validate=False)
-        self.normals, self.areas, self.centres = (
-            triangles.face_normals,
-            triangles.area_faces,
-            triangles.triangles_center,
-        )
-        self.edges, self.pairs = triangles.face_adjacency_edges, triangles.face_adjacency
-        opposite = triangles.face_adjacency_unshared
-        _, number, count = np.unique(triangles.edges_sorted, axis=0, return_inverse=True, return_counts=True)
-        alone = np.flatnonzero(count[number.ravel()] == 1)
-        self.rim, self.rim_faces = triangles.edges[alone], triangles.edges_face[alone]
+        corners = self.V[self.F]
+        (self.normals, self.areas), self.centres = normals_and_areas(corners), corners.mean(axis=1)
+        self.edges, self.pairs, opposite = edges_of(self.F, 2)
+        self.rim, rim_faces, _ = edges_of(self.F, 1)
+        self.rim_faces = rim_faces[:, 0]
         n1, n2 = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         self.bend = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("ij,ij->i", n1, n2))
         # Off-plane distance of each far corner: unlike an angle it does not blow up on slivers.

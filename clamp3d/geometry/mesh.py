@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -51,7 +52,7 @@ class Mesh:
     @property
     def slivers(self) -> NDArray[np.bool_]:
         """Triangles (m,) without a normal: no higher than the rounding of their corners."""
-        return _slivers(self.vertices, self.faces, self.rounding)
+        return slivers_of(self.vertices, self.faces, 4.0 * self.rounding)
 
     def crosses_itself(self) -> bool:
         """Whether triangles reach through each other, by more than the rounding of their corners."""
@@ -305,18 +306,18 @@ def _merge(V: Array, F: IntArray, tolerance: float, name: str) -> tuple[Array, I
     return unique[keep], number[F]
 
 
-def _slivers(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
-    """Faces (m,) that are no higher than the ``rounding`` (mm) of their corners."""
+def slivers_of(V: Array, F: IntArray, height: float) -> NDArray[np.bool_]:
+    """Faces (m,) that are no higher than ``height`` (mm) over their longest side."""
     corners = V[F]
     sides = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1)
-    return np.asarray(twice_area <= 4.0 * rounding * longest)
+    return np.asarray(twice_area <= height * longest)
 
 
 def _in_the_way(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
     """Slivers (m,) on edges of an odd number of faces, if without them there are no such edges; else none."""
-    thin = _slivers(V, F, rounding)
+    thin = slivers_of(V, F, 4.0 * rounding)
     gone = np.zeros(len(F), dtype=bool)
     while not gone.all():
         rest = np.flatnonzero(~gone)
@@ -328,6 +329,16 @@ def _in_the_way(V: Array, F: IntArray, rounding: float) -> NDArray[np.bool_]:
             break
         gone[rest[odd & thin[rest]]] = True
     return np.zeros(len(F), dtype=bool)
+
+
+def appended(vertices: Sequence[Array], faces: Sequence[IntArray]) -> tuple[Array, IntArray]:
+    """Meshes with ``vertices`` (n, 3) and ``faces`` (m, 3) each as one, in their order.
+
+    >>> appended([np.zeros((3, 3)), np.ones((3, 3))], [np.array([[0, 1, 2]]), np.array([[2, 1, 0]])])[1].tolist()
+    [[0, 1, 2], [5, 4, 3]]
+    """
+    starts = np.cumsum([0, *map(len, vertices[:-1])])
+    return np.concatenate(vertices), np.concatenate([own + n for own, n in zip(faces, starts, strict=True)])
 
 
 def _ends(F: IntArray) -> IntArray:

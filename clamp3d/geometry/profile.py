@@ -98,6 +98,17 @@ def chord_count(angle: float, widest: float) -> int:
     return max(1, math.ceil(abs(angle) / widest - 1e-9))
 
 
+def turns(corners: Array) -> Array:
+    """Sines (k,) of the turns of a closed polygon at its corners (k, 2), positive to the left.
+
+    >>> turns(np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0)])).round(9).tolist()
+    [0.707106781, 0.0, 1.0, 0.707106781]
+    """
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return np.asarray((before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / np.maximum(size, 1e-300))
+
+
 @dataclass(frozen=True, slots=True)
 class Segment:
     """Straight edge of an outline.
