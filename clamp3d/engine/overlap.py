@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,22 +20,13 @@ _CORNERS = 400
 """Corners of an overlap that are measured."""
 
 
-@dataclass(eq=False)
-class Common:
-    """The common part of two meshes, a closed mesh in the frame of the first: ``vertices`` (n, 3), ``faces`` (m, 3)."""
-
-    vertices: Array
-    faces: NDArray[np.int64]
+class Common(Surface):
+    """The common part of two meshes, a closed mesh in the frame of the first."""
 
     @cached_property
     def volume(self) -> float:
         """Volume in mm^3."""
         return max(0.0, float(volume(self.vertices, self.faces)))
-
-    @property
-    def box(self) -> Array:
-        """Lower and upper corner (2, 3), mm."""
-        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @cached_property
     def areas(self) -> tuple[Array, Array]:
@@ -59,7 +49,7 @@ class Common:
         normal, area = self.areas
         depth = self.volume / max(float(area.sum()), 1e-300)
         points = self.middles() - depth * normal[self._largest]
-        return np.asarray(points[Surface(self.vertices, self.faces).contains(points)])
+        return np.asarray(points[self.contains(points)])
 
     def directions(self, most: int = 4) -> Array:
         """Unit vectors (k, 3) square to the largest flat sides of the common part."""
