@@ -10,7 +10,7 @@ import numpy as np
 from clamp3d.errors import InputError
 from clamp3d.files.bodies import Reading
 from clamp3d.geometry.mesh import IntArray, make_mesh
-from clamp3d.geometry.pose import Array
+from clamp3d.geometry.pose import Array, nearest_rigid
 from clamp3d.geometry.shapes import MeshShape
 
 
@@ -56,10 +56,7 @@ class Placer(Reading):
 
 def rigid_part(T: Array) -> tuple[Array, Array]:
     """A placement (4, 4) as a rigid pose after a scale, shear or reflection (3, 3): the identity where it is rigid."""
-    R = T[:3, :3]
-    left, _, right = np.linalg.svd(R)
-    pose = T.copy()
-    pose[:3, :3] = turn = left * (1.0, 1.0, np.sign(np.linalg.det(R))) @ right
-    form = turn.T @ R
+    pose = nearest_rigid(T)
+    form = pose[:3, :3].T @ T[:3, :3]
     is_rigid = np.abs(form - np.eye(3)).max() <= 5e-6  # written with few digits
     return pose, np.eye(3) if is_rigid else form

@@ -134,7 +134,7 @@ def nearest_rigid(T: Array) -> Array:
     Parameters
     ----------
     T : ndarray of shape (4, 4) or (n, 4, 4)
-        Finite poses with a positive determinant.
+        Finite poses; of one that reflects the direction that is stretched least is turned over.
 
     Returns
     -------
@@ -148,6 +148,7 @@ def nearest_rigid(T: Array) -> Array:
     True
     """
     U, _, Vt = np.linalg.svd(T[..., :3, :3])  # SciPy's conversions take a small stretch for a turn
+    U[..., 2] *= np.sign(np.linalg.det(T[..., :3, :3]))[..., None]
     out = T.copy()
     out[..., :3, :3] = U @ Vt
     return out

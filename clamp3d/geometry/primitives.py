@@ -58,33 +58,31 @@ class SweptArc:
 
 
 @dataclass(frozen=True, slots=True)
-class Cylinder:
+class _Round:
+    """What is round about z, centred; mm."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "length"):
+            object.__setattr__(self, name, size(f"{type(self).__name__.lower()} {name}", getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder(_Round):
     """A wire, pin or bolt with flat ends: axis on z, centred, full ``length``; mm.
 
     Raises InputError for sizes that are not positive.
     """
 
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", size("cylinder radius", self.radius))
-        object.__setattr__(self, "length", size("cylinder length", self.length))
-
 
 @dataclass(frozen=True, slots=True)
-class Capsule:
+class Capsule(_Round):
     """All points within ``radius`` of an axis segment of ``length`` on z, centred; mm.
 
     It is longer than the segment by the radius at either end. Raises InputError for sizes that are not positive.
     """
-
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", size("capsule radius", self.radius))
-        object.__setattr__(self, "length", size("capsule length", self.length))
 
 
 AnyCylinder: TypeAlias = Cylinder | Capsule
