@@ -28,6 +28,7 @@ from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere, cylinder
+from clamp3d.geometry.triangles import normals_and_areas
 
 if TYPE_CHECKING:
     from clamp3d.fit.features import FitResult
@@ -125,8 +126,11 @@ class Model:
 
     @property
     def chords(self) -> tuple[float, ...]:
-        """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one for given triangles."""
-        raise NotImplementedError
+        """Chord errors (mm) of the meshes that are worth a question, from coarse to fine; one where a mesh is exact.
+
+        So it is of given triangles, too.
+        """
+        return DRAWN_CHORDS if self.bracketed else DRAWN_CHORDS[:1]
 
     @property
     def fine_chord(self) -> float:
@@ -230,11 +234,6 @@ class DrawnModel(Model):
         """Lower and upper corner (2, 3) of the part's box, mm."""
         return self.shape.bounds
 
-    @property
-    def chords(self) -> tuple[float, ...]:
-        """Chord errors (mm) of its meshes; one where a mesh is exact."""
-        return DRAWN_CHORDS if self.bracketed else DRAWN_CHORDS[:1]
-
     @cached_property
     def bodies(self) -> Forms | None:
         """Convex pieces less grooves and holes; None for outlines that have no such form."""
@@ -305,12 +304,9 @@ class CadModel(Model):
         from clamp3d.engine.fitted import bodies_of_fit
         from clamp3d.fit.cad import fit_solid
 
-        fit = fit_solid(self.shape)
-        if not fit.features:
-            return self._hull_of_convex(mesh)
         tessellation = self.shape.tessellated(CHORD)
         flat = self.shape.surfaces.kind[tessellation.face] == PLANE
-        return bodies_of_fit(fit, mesh, chord=tessellation.errors, flat=flat)
+        return bodies_of_fit(fit_solid(self.shape), mesh, chord=tessellation.errors, flat=flat)
 
     @cached_property
     def is_free_form(self) -> bool:
@@ -355,11 +351,6 @@ class MeshModel(Model):
     def bracketed(self) -> bool:
         """Whether the fit says that it is a cylinder: then meshes lie inside and around that."""
         return self._cylinder is not None
-
-    @property
-    def chords(self) -> tuple[float, ...]:
-        """Those of a drawn solid where it is a cylinder; else one, for the given triangles."""
-        return DRAWN_CHORDS if self.bracketed else DRAWN_CHORDS[:1]
 
     @cached_property
     def bounds(self) -> Array:
@@ -454,12 +445,11 @@ def _bulge(shape: MeshShape) -> float:
     """How far round surfaces through the vertices can stand out of the facets, mm, from widths and bends alone."""
     V, F = shape.mesh.vertices, shape.mesh.faces
     edges, pairs, _ = edges_of(F, 2)
-    normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])[pairs]
-    twice_area = np.linalg.norm(normals, axis=2)
+    normals, areas = (of_each[pairs] for of_each in normals_and_areas(V[F]))
     across = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1)
     angles = np.arctan2(across, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
     length = np.linalg.norm(V[edges[:, 1]] - V[edges[:, 0]], axis=1)
-    wide = twice_area.max(axis=1) / np.maximum(length, 1e-300)
+    wide = 2.0 * areas.max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
     return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))
