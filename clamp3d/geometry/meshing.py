@@ -75,20 +75,13 @@ def mesh(part: Solid, mesh_error: float = 0.01) -> trimesh.Trimesh:
 
 def enclosed(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]] | None:
     """Vertices (n, 3) mm and faces (m, 3) of a closed mesh that lies wholly in the part; None where nothing is left."""
-    return _one_sided(part, mesh_error, "inner")
+    solid = _solid(part, mesh_error, "inner")
+    return None if solid.is_empty() else arrays_of(solid)
 
 
 def enclosing(part: Solid, mesh_error: float) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3) mm and faces (m, 3) of a closed mesh that the part lies wholly in."""
-    solid = _one_sided(part, mesh_error, "outer")
-    if solid is None:
-        raise Clamp3dError(f"mesh of {part.name} is empty: one of its sizes vanishes beside the others")
-    return solid
-
-
-def _one_sided(part: Solid, mesh_error: float, side: Side) -> tuple[Array, NDArray[np.int64]] | None:
-    solid = _solid(part, mesh_error, side)
-    return None if solid.is_empty() else arrays_of(solid)
+    return arrays_of(_solid(part, mesh_error, "outer"))
 
 
 def chord_error(part: Solid, mesh_error: float) -> float:
