@@ -39,7 +39,8 @@ class CadPair:
 
     def levels(self, closed_forms: Levels) -> Levels:
         """All levels; ``closed_forms`` come after those that take less time."""
-        yield from self._coarse_meshes()
+        if self._chords:
+            yield self._meshes(self._chords[0])
         yield from self._nearest()
         if self._attested <= _COINCIDENT:
             yield from self._fine_meshes(quick=True)
@@ -50,10 +51,6 @@ class CadPair:
         yield from self._fine_meshes(quick=False)
         if CAD_CHORDS[-1] not in self._chords:  # Open CASCADE did not find the common part
             yield self._meshes(CAD_CHORDS[-1], thorough=True)
-
-    def _coarse_meshes(self) -> Levels:
-        if self._chords:
-            yield self._meshes(self._chords[0])
 
     def _nearest(self) -> Levels:
         """What some points attest, and Open CASCADE's distance, which is bound by what contradicts it now and then."""

@@ -26,6 +26,8 @@ End = Callable[[Distance, Distance], bool]
 """Whether bounds of an interference are sharp enough, or none can be, since none are closer than the second ones."""
 
 METHOD = f"Open CASCADE, tolerance {TOLERANCE:g} mm"
+_UNKNOWN = Distance(method=f"{METHOD}, without a common part")
+"""What is said where Open CASCADE gives no common part."""
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
 SHARES = (0.04, 0.015, 0.004)
@@ -117,16 +119,15 @@ def exact_overlap(
     """
     assert a.exact is not None
     assert b.exact is not None
-    unknown = Distance(method=f"{METHOD}, without a common part")
     try:
         find = cad_process.quick_common if quick else cad_process.common
         shared = find(a.exact.brep, b.exact.brep, T, share)
     except Clamp3dError:  # it takes too long, or fails
-        return unknown
+        return _UNKNOWN
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
     if not all(len(border.triangles) for border in shared.borders):
-        return unknown
+        return _UNKNOWN
     on_a, on_b = shared.borders
     # Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     sides = [_measured(on_a, on_b), _measured(on_b, on_a)]
@@ -145,7 +146,7 @@ def exact_overlap(
 
     at_most = farthest(sides, is_end, _CUTS)
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
-        return replace(reached, method=unknown.method)
+        return replace(reached, method=_UNKNOWN.method)
     return bounded(at_most)
 
 
@@ -155,15 +156,14 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
     It misses those between round faces that are nearly tangent: of a ball and a ring one of 0.014 mm was seen. No proof
     that there is none, so `_NARROW` is allowed for: one so deep is wider than the facets of the meshes looked at.
     """
-    unknown = Distance(method=f"{METHOD}, without a common part")
     if attested > _FAINT:
-        return unknown
+        return _UNKNOWN
     try:
         deepest = exact_probe(a, b, T, chord=_HIDING, points_each=_MANY)
     except Clamp3dError:  # such meshes may take too long to make
-        return unknown
+        return _UNKNOWN
     if -deepest.upper > _FAINT:
-        return replace(deepest, method=unknown.method)
+        return replace(deepest, method=_UNKNOWN.method)
     return Distance(-_NARROW, method=METHOD)
 
 

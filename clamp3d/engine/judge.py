@@ -31,10 +31,10 @@ def judge(
 
     Of an overlap the distance bounds minus the interference, or minus the depth where two convex pieces tell it.
     """
-    if is_duplicate(a, b, T, thresholds.contact):
+    if a is b and (apart := _moved_by(a, T)) <= thresholds.contact:  # equal shapes share their model
         verdict = Verdict.ALLOWED if allowance == np.inf else Verdict.DUPLICATE
         # Each point of one lies so near to the same point of the other.
-        return verdict, replace(start, lower=-np.inf, upper=_moved_by(a, T), level="boxes", method="equal shapes")
+        return verdict, replace(start, lower=-np.inf, upper=apart, level="boxes", method="equal shapes")
 
     def certain(distance: Distance) -> bool:
         return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN
@@ -49,11 +49,6 @@ def judge(
     if verdict is Verdict.CLASH:
         verdict = kind_of_overlap(a, b, T, thresholds.contact)
     return verdict, distance
-
-
-def is_duplicate(a: Model, b: Model, T: Array, contact: float) -> bool:
-    """Whether two parts have one shape and, within ``contact`` mm, one place; ``b`` at ``T`` (4, 4) in a's frame."""
-    return a is b and _moved_by(a, T) <= contact  # equal shapes share their model
 
 
 def _moved_by(model: Model, T: Array) -> float:

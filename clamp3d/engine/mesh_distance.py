@@ -50,7 +50,8 @@ def _between_meshes(
     inner_a, inner_b = a.inner(error), b.inner(error)
     if inner_a is None or inner_b is None:
         return Distance(outer.lower)
-    inner = surface_distance(inner_a, inner_b, T, _nothing)
+    # No upper bound of an overlap is asked for: the inner meshes attest depths alone.
+    inner = surface_distance(inner_a, inner_b, T, lambda _: False)
     p, q = inner.point_a, inner.point_b
     if inner.lower > 0.0 and p is not None and q is not None:
         p = _towards(a, np.eye(4), p, q)
@@ -102,11 +103,6 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
         return enough(of_thickness(bound)) or not enough(of_thickness(reached))
 
     return of_thickness(thickness(a, b, T, shared, end, cuts))
-
-
-def _nothing(_: Distance) -> bool:
-    """Nothing is enough, and no upper bound of an overlap is asked for: the inner meshes attest depths alone."""
-    return False
 
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:

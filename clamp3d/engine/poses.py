@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clamp3d.checks import array, function, instance, items
+from clamp3d.checks import function, instance, items
 from clamp3d.engine.batch import bounds_at_poses, overlaps_at_poses
 from clamp3d.engine.broad import Boxes, near_between
 from clamp3d.engine.judge import judge, kind_of_overlap, may_hold
@@ -137,7 +137,7 @@ def check_poses(
     rest = [scene.index(name) for name in names]
     if number in rest:
         raise InputError(f"others must not hold {part!r} itself")
-    T = check_pose_array(array("poses", poses, (None, 4, 4), finite=False))
+    T = check_pose_array(poses)
     moving, standing = cache.model(scene.parts[number].shape), [cache.model(scene.parts[k].shape) for k in rest]
     P = np.array([scene.parts[k].T_world for k in rest]).reshape(-1, 4, 4)
     reach = scene.thresholds.reach

@@ -64,10 +64,6 @@ class Surface:
         """Lower and upper corner (2, 3), mm."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    def box_gap(self, points: Array) -> Array:
-        """How far (k,) mm points (k, 3) are beyond the box, along the axis where that is most: no nearer they are."""
-        return np.asarray(np.maximum(self.box[0] - points, points - self.box[1]).max(axis=1))
-
     @cached_property
     def bvh(self) -> Any:
         """FCL's tree of oriented boxes."""
@@ -168,11 +164,9 @@ class Surface:
 
     def is_outside(self, triangles: Array) -> NDArray[np.bool_]:
         """Which of triangles (m, 3, 3) certainly have no point in common with the closed body."""
-        outside = np.zeros(len(triangles), dtype=bool)
-        if self.has_sides:
-            outside[:] = ~self.may_meet(triangles)
-            behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
-            outside[outside] = is_certain & ~behind
+        outside = ~self.may_meet(triangles)
+        behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
+        outside[outside] = is_certain & ~behind
         return outside
 
     def is_crossed(self, triangles: Array, moves: Array) -> NDArray[np.bool_]:
@@ -253,8 +247,7 @@ class Surface:
         """The largest error (m,) of a triangle and all that share a corner with it."""
         assert self.face_error is not None
         corner = np.zeros(len(self.vertices))
-        for k in range(3):
-            np.maximum.at(corner, self.faces[:, k], self.face_error)
+        np.maximum.at(corner, self.faces.reshape(-1), np.repeat(self.face_error, 3))
         return np.asarray(corner[self.faces].max(axis=1))
 
 
@@ -313,6 +306,6 @@ def at_edges(
     sharp = (patch[pairs[:, 0]] != patch[pairs[:, 1]]) & (cosine <= np.cos(smooth) + 1e-9)
     wider = sharp & ((knife & (total > 0.0)) | (both > 0.0).all(axis=1))
     widened = error.copy()
-    for side in (0, 1):
-        np.maximum.at(widened, pairs[wider, side], np.where(both[wider, side] > 0.0, total[wider], 0.0))
+    off = np.where(both > 0.0, total[:, None], 0.0)[wider]
+    np.maximum.at(widened, pairs[wider].reshape(-1), off.reshape(-1))
     return widened

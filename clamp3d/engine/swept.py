@@ -67,21 +67,14 @@ def _swept(piece: Convex, poses: tuple[Array, ...], angle: float) -> tuple[Conve
             ways = np.array([to_target(T, piece.ends) for T in poses])
             reach = float(np.linalg.norm(ways - ways[1], axis=2).max()) + _sagitta(ways, angle)
             return Ball(piece.radius + reach, piece.T), poses[1], 0.0
-    swept, sag = _swept_hull(piece, poses, angle)
-    return swept, np.eye(4), sag
-
-
-def _swept_hull(piece: Hull, poses: tuple[Array, ...], angle: float) -> tuple[Hull, float]:
-    """Hull of a polyhedron at all three poses, in the standing part's frame, and how far arcs leave it."""
-    ways = np.array([to_target(T, piece.vertices) for T in poses])
-    return hull((ways if angle else ways[::2]).reshape(-1, 3)), _sagitta(ways, angle)
+    ways = np.array([to_target(T, piece.vertices) for T in poses])  # of a polyhedron at all three, and their hull
+    return hull((ways if angle else ways[::2]).reshape(-1, 3)), np.eye(4), _sagitta(ways, angle)
 
 
 def _swept_rod(rod: Rod, poses: tuple[Array, ...], angle: float) -> Rod:
     """A rod, in its own part's frame at the middle pose, that holds the moving one all the time."""
-    ends = rod.T[:3, 3] + np.outer([-0.5 * rod.length, 0.5 * rod.length], rod.T[:3, 2])
     home = inverse(poses[1] @ rod.T)
-    ways = np.array([to_target(home, to_target(T, ends)) for T in poses])
+    ways = np.array([to_target(home, to_target(T, rod.ends)) for T in poses])
     local, sag = ways.reshape(-1, 3), _sagitta(ways, angle)
     axes = [home[:3, :3] @ T[:3, :3] @ rod.T[:3, 2] for T in poses]
     tilt = rod.radius * max(float(np.hypot(axis[0], axis[1])) for axis in axes)

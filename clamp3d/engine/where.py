@@ -14,6 +14,7 @@ from clamp3d.engine.model import QUICK_TRIANGLES, MeshModel, Model, box_corners
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
+from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.triangles import normals_and_areas, quarters
@@ -174,10 +175,8 @@ class Locator:
         """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
         if self.a.exact is None or self.b.exact is None:
             return None
-        from clamp3d.files.cad_process import common as exact_common
-
         try:
-            shared = exact_common(self.a.exact.brep, self.b.exact.brep, self.T_ab)
+            shared = cad_process.common(self.a.exact.brep, self.b.exact.brep, self.T_ab)
         except Clamp3dError:
             return None
         if not shared.volume > 0.0:
@@ -197,7 +196,8 @@ def _area_near(surface: Surface, other: Surface, T: Array, reach: float) -> floa
     while True:
         middles = pieces.mean(axis=1)
         size = np.linalg.norm(pieces - middles[:, None], axis=2).max(axis=1)
-        may_be_near = other.box_gap(middles) <= reach + size
+        beyond_box = np.maximum(other.box[0] - middles, middles - other.box[1]).max(axis=1)
+        may_be_near = beyond_box <= reach + size
         pieces, middles, size = (x[may_be_near] for x in (pieces, middles, size))
         is_near = other.distance(middles) <= reach + size
         beyond = pieces[~is_near]

@@ -68,17 +68,15 @@ def to_bytes(shape: Any) -> bytes:
     return stream.getvalue()
 
 
-@lru_cache(maxsize=512)
-def from_bytes(brep: bytes) -> Any:
-    """The TopoDS_Shape of `to_bytes`, one for all that ask. Raises MissingLibraryError without Open CASCADE."""
-    return parse(brep)
-
-
 def parse(brep: bytes) -> Any:
     """A new TopoDS_Shape of the bytes. Raises MissingLibraryError without Open CASCADE."""
     shape = occ.TopoDS_Shape()
     occ.BinTools.Read_s(shape, io.BytesIO(brep))
     return shape
+
+
+from_bytes = lru_cache(maxsize=512)(parse)
+"""The TopoDS_Shape of `to_bytes`, one for all that ask. Raises MissingLibraryError without Open CASCADE."""
 
 
 def explore(shape: Any, kind: str, outside: str = "SHAPE") -> Iterator[Any]:
