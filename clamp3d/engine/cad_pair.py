@@ -61,8 +61,8 @@ class CadPair:
         unproven = replace(distance, lower=-np.inf)
         if distance.lower > probe.upper:  # a point lies in both solids
             distance = unproven
-        is_free_form = self.a.is_free_form or self.b.is_free_form
-        if not (is_free_form and self._chords and np.isfinite(distance.lower)):
+        may_be_checked = bool(self._chords) and np.isfinite(distance.lower)
+        if not (may_be_checked and (self.a.is_free_form or self.b.is_free_form)):
             yield "exact", distance
             return
         # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.

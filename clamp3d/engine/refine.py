@@ -91,7 +91,7 @@ def _chords(a: Model, b: Model) -> list[float]:
         return []
     every = sorted({*a.chords, *b.chords}, reverse=True)
     if not (a.refines or b.refines):
-        return every[:1]
+        return every[-1:]
     coarsest, finest = min(a.chords[0], b.chords[0]), min(a.chords[-1], b.chords[-1])
     fixed = max((model.outer(coarsest).error for model in (a, b) if not model.refines), default=0.0)
     chords = [chord for chord in every if finest <= chord <= coarsest]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clamp3d import Distance, shapes
-from clamp3d.engine import exact, refine
+from clamp3d.engine import cad_pair, refine
 from clamp3d.engine.closed_form import ClosedForm, bodies_distance
 from clamp3d.engine.hull import hull
 from clamp3d.engine.model import ModelCache
@@ -84,10 +84,10 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
     def meshes(a, b, T, chord, enough, *, thorough=False, cuts=None):
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
-    monkeypatch.setattr(refine, "meshes_distance", meshes)
-    monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
-    monkeypatch.setattr(exact, "exact_overlap", overlap)
+    monkeypatch.setattr(cad_pair, "meshes_distance", meshes)
+    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
+    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
+    monkeypatch.setattr(cad_pair, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
     begin, both = ["probe", "distance"], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
@@ -115,10 +115,10 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     def fails(*_, **__):
         raise SolverError("no answer in 20 s")
 
-    monkeypatch.setattr(refine, "meshes_distance", fails)
-    monkeypatch.setattr(exact, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(exact, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
-    monkeypatch.setattr(exact, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
+    monkeypatch.setattr(cad_pair, "meshes_distance", fails)
+    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
+    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
+    monkeypatch.setattr(cad_pair, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
 
     class Unmeshed(SimpleNamespace):
         fine_triangles = property(fails)
@@ -135,7 +135,7 @@ def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine()
         ((0.1, 0.02), (0.05, 0.01), 0.03, [0.05, 0.02, 0.01]),
         ((0.1,), (0.1, 0.02), 0.0, [0.1, 0.02]),
         ((0.5,), (0.5, 0.1, 0.02, 0.01), 0.03, [0.5, 0.1, 0.02]),  # no finer than the error of the given triangles
-        ((0.1,), (0.05,), 0.0, [0.1]),
+        ((0.1,), (0.5,), 0.0, [0.1]),  # a large solid from CAD and given triangles
         ((), (0.1, 0.02), 0.0, []),
     ):
         mesh = SimpleNamespace(error=error)
