@@ -78,20 +78,9 @@ def dot(radius: float, colour: str) -> g.Object:
     return g.Mesh(g.Sphere(radius), _phong(colour, depthTest=False, transparent=True))
 
 
-def arrow(
-    start: Array,
-    direction: Array,
-    length: float,
-    colour: str,
-    *,
-    thickness: float | None = None,
-    on_top: bool = False,
-) -> g.Object:
-    """An arrow of ``length`` mm from ``start`` (3,) along the unit ``direction`` (3,).
-
-    Its shaft is ``thickness`` mm thick, by default in proportion.
-    """
-    radius = 0.035 * length if thickness is None else 0.5 * thickness
+def arrow(start: Array, direction: Array, length: float, thickness: float, colour: str, *, on_top: bool) -> g.Object:
+    """An arrow of ``length`` mm from ``start`` (3,) along the unit ``direction`` (3,), its shaft so many mm thick."""
+    radius = 0.5 * thickness
     head = min(8.5 * radius, 0.8 * length)
     outline = [[0.0, 0.0], [radius, 0.0], [radius, length - head], [3.0 * radius, length - head], [0.0, length]]
     mesh = trimesh.creation.revolve(np.array(outline), sections=24)

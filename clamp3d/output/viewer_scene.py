@@ -186,8 +186,8 @@ class SceneDrawing:
         elif d.upper <= d.lower + 0.01 * self.size:  # else they touch, but it is not certain where
             self._dot(marks["point"], 0.5 * (d.point_a + d.point_b), row.colour)
             if d.normal is not None and not row.what.startswith("screw"):
-                arrow = draw.arrow(d.point_a, d.normal, 0.06 * self.size, darker(row.colour, 0.55))
-                marks["normal"].set_object(arrow)
+                length, colour = 0.06 * self.size, darker(row.colour, 0.55)
+                marks["normal"].set_object(draw.arrow(d.point_a, d.normal, length, 0.07 * length, colour, on_top=False))
 
     def _clash(self, marks: Visualizer, row: Row, number: int) -> None:
         red, a, b, poses = VERDICT_COLOURS["clash"], row.a, row.b, self.timeline.stops[number].poses
@@ -232,8 +232,7 @@ class SceneDrawing:
             marks = self._root[f"forces/{group}/{f.a}-{f.b}/{k}"]
             length, thickness = f.force * self.force_length, _SHAFT * self.size
             tail = f.point - length * f.direction
-            arrow = draw.arrow(tail, f.direction, length, FORCE, thickness=thickness, on_top=True)
-            marks["arrow"].set_object(arrow)
+            marks["arrow"].set_object(draw.arrow(tail, f.direction, length, thickness, FORCE, on_top=True))
             beside = tail - 0.025 * self.size * f.direction
             self._label(marks["value"], f"force {f.force:.3f}", beside, "#F3E5F7", 0.7)
 
