@@ -6,11 +6,9 @@ none of them a verdict's; bolt and nut are greys. Each part also carries its nam
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from clamp3d.clamp.dimensions import PartName
-
-PART_COLOURS: dict[PartName, str] = {
+PART_COLOURS: dict[str, str] = {
     "P1": "#77AADD",
     "P2": "#44BB99",
     "P3": "#EE8866",
@@ -61,5 +59,4 @@ def part_colours(names: Sequence[str]) -> dict[str, str]:
     >>> part_colours(["P1", "pin"])
     {'P1': '#77AADD', 'pin': '#44BB99'}
     """
-    fixed: Mapping[str, str] = dict(PART_COLOURS)
-    return {name: fixed.get(name, _CYCLE[k % len(_CYCLE)]) for k, name in enumerate(names)}
+    return {name: PART_COLOURS.get(name, _CYCLE[k % len(_CYCLE)]) for k, name in enumerate(names)}
