@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib")
-FILES = ("report.html", "report.json", "pairs.csv")
 PICTURES = 24
 """Findings of a scene that get a picture, the worst ones."""
 _DARK = (
@@ -47,7 +46,7 @@ def write_report(report: Report, folder: Path, *, progress: Callable[[str], None
     """
     page = report_html(report, progress=progress)
     data = json.dumps(report_to_dict(report), indent=2, allow_nan=False) + "\n"
-    files = dict(zip(FILES, (page, data, report_csv(report)), strict=True))
+    files = {"report.html": page, "report.json": data, "pairs.csv": report_csv(report)}
     return write_files(folder, {name: text.encode("utf-8", "backslashreplace") for name, text in files.items()})
 
 
@@ -149,7 +148,7 @@ def _versions() -> dict[str, str]:
 def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list[tuple[str, PairRow | None]]]:
     """Pictures as data addresses, each with the pair that it shows: 'overview', 'pairs' and, of a clamp, 'steps'."""
     from clamp3d.output.assembly_figures import steps_figure
-    from clamp3d.output.figures import contact_figure, states_figure
+    from clamp3d.output.figures import contact_figure, picture, states_figure
     from clamp3d.output.scene_figures import finding_figure, scene_figure
 
     scene, assembly = report.scene, report.assembly
@@ -157,7 +156,8 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
 
     def add(kind: str, name: str, figure: Callable[..., Figure], *shown: Any, row: PairRow | None = None) -> None:
         progress(f"picture of {name}")
-        out[kind].append((_data_address(figure(*shown)), row))
+        svg = picture(figure(*shown), "svg").replace(b"</style>", f"{_DARK}</style>".encode(), 1)
+        out[kind].append(("data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii"), row))
 
     if assembly is not None:
         add("overview", "the states", states_figure, assembly)
@@ -172,13 +172,6 @@ def _pictures(report: Report, progress: Callable[[str], None]) -> dict[str, list
         for row in rows:
             add("pairs", row.name, finding_figure, scene, row, row=row)
     return out
-
-
-def _data_address(figure: Figure) -> str:
-    from clamp3d.output.figures import picture
-
-    svg = picture(figure, "svg").replace(b"</style>", f"{_DARK}</style>".encode(), 1)
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def _pair_to_dict(row: PairRow) -> dict[str, Any]:
