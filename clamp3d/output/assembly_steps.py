@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -14,11 +15,10 @@ from clamp3d.clamp.section import Section
 from clamp3d.clamp.status import Seat, seats
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.geometry.pose import SectionPose
-from clamp3d.output.section import Poses, edge_openings
+from clamp3d.output.section import WIRES, Poses, edge_openings
 
 TIGHTENING_STAGES = 4
 _PARALLEL = math.radians(0.005)  # the angle that prints as 0.00 deg
-_WIRES: tuple[PartName, ...] = ("P6", "P7")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,33 +61,29 @@ class StepRow:
         return "; ".join([*words, *rests, *loose])
 
 
-def step_rows(assembly: Assembly) -> tuple[StepRow, ...]:
+def step_rows(assembly: Assembly) -> Iterator[StepRow]:
     """The state at every waypoint of an assembly."""
     clamp, start, last = assembly.clamp, *_last_step(assembly)
     # A solver that tries positions leaves small gaps; what it counted as seated is seated here.
     tolerance = max([TOUCHING, *(s.gap for s in assembly.seats if s.seated)])
-    rows, section = [], Section(clamp, assembly.model)
+    section = Section(clamp, assembly.model)
     for waypoint in assembly.path:
         poses = waypoint.poses
         line, jumper = edge_openings(clamp, poses)
         left = poses["P1"].x
-        rows.append(
-            StepRow(
-                waypoint=waypoint,
-                opening_line=line,
-                opening_jumper=jumper,
-                tilt=poses["P2"].angle - poses["P1"].angle,
-                turns=round((_screwed(poses) - _screwed(start)) / clamp.bolt.pitch, 9) + 0.0
-                if waypoint in last
-                else 0.0,
-                seats=seats(section, section.state(poses), tolerance),
-                outside=tuple(w for w in _WIRES if not left < poses[w].x < left + clamp.up_splint.width),
-            )
+        way = _screwed(poses) - _screwed(start) if waypoint in last else 0.0
+        yield StepRow(
+            waypoint=waypoint,
+            opening_line=line,
+            opening_jumper=jumper,
+            tilt=poses["P2"].angle - poses["P1"].angle,
+            turns=round(way / clamp.bolt.pitch, 9) + 0.0,
+            seats=seats(section, section.state(poses), tolerance),
+            outside=tuple(w for w in WIRES if not left < poses[w].x < left + clamp.up_splint.width),
         )
-    return tuple(rows)
 
 
-def tightening(assembly: Assembly) -> list[dict[str, float]]:
+def tightening(assembly: Assembly) -> Iterator[dict[str, float]]:
     """The nut's own step: in equal stages where it is one straight way, else where that changes.
 
     Turns of the nut in it, by how much the bolt is drawn up, and the gap of the saddle; mm.
@@ -95,13 +91,11 @@ def tightening(assembly: Assembly) -> list[dict[str, float]]:
     before, last = _last_step(assembly)
     ways = np.linspace(0.0, 1.0, TIGHTENING_STAGES + 1)
     stages = [between(before, last[0].poses, float(f)) for f in ways]
-    rows = []
     for poses in stages if len(last) == 1 else [before, *(waypoint.poses for waypoint in last)]:
         way = _screwed(poses) - _screwed(before)
         (saddle,) = measure_contacts(assembly.clamp, poses, assembly.model, pairs=[("P2", "P3")])
         gap = 0.0 if abs(saddle.gap) <= TOUCHING else saddle.gap
-        rows.append({"nut_turns": way / assembly.clamp.bolt.pitch, "way_mm": way, "saddle_gap_mm": gap})
-    return rows
+        yield {"nut_turns": way / assembly.clamp.bolt.pitch, "way_mm": way, "saddle_gap_mm": gap}
 
 
 def between(start: Poses, end: Poses, f: float) -> dict[PartName, SectionPose]:

@@ -103,12 +103,12 @@ class Report:
     @cached_property
     def steps(self) -> tuple[assembly_steps.StepRow, ...]:
         """How a clamp comes together."""
-        return assembly_steps.step_rows(self.assembly) if self.assembly else ()
+        return tuple(assembly_steps.step_rows(self.assembly)) if self.assembly else ()
 
     @cached_property
     def tightening(self) -> list[dict[str, float]]:
         """The stages of the nut's own step."""
-        return assembly_steps.tightening(self.assembly) if self.assembly else []
+        return list(assembly_steps.tightening(self.assembly)) if self.assembly else []
 
     @property
     def modelled(self) -> list[str]:
