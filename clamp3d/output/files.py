@@ -109,8 +109,6 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         with ExitStack() as stack:
             for path, content in zip(paths, files.values(), strict=True):
-                if path.is_dir():
-                    raise InputError(f"cannot write {path}: it is a folder")
                 stack.enter_context(whole_file(path)).write_bytes(content)
     except OSError as error:
         raise InputError(f"cannot write into {short(folder)}: {error.strerror}") from None
