@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.depth import LONG
 from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Verdict
+from clamp3d.engine.where import Overlap
 from clamp3d.output.groups import Group, grouped
-
-if TYPE_CHECKING:
-    from clamp3d.engine.where import Overlap
 
 
 def gap_text(lower: float, upper: float, *, digits: int = 6) -> str:
@@ -205,8 +202,8 @@ def contact_text(row: PairResult) -> str:
     """
     if row.contact_at is None:
         return ""
-    first, seen = first_text(row.contact_at), touching_at(row)
-    return first if seen == row.contact_at else f"{first} to {math.ceil(round(seen * 1e4, 6)) / 1e4:.4f}"
+    first, seen = _time(row.contact_at, math.floor), touching_at(row)
+    return first if seen == row.contact_at else f"{first} to {_time(seen, math.ceil)}"
 
 
 def touching_at(row: PairResult) -> float:
@@ -215,13 +212,13 @@ def touching_at(row: PairResult) -> float:
     return at if by is None or by - at <= 1e-4 else by
 
 
-def first_text(t: float) -> str:
-    """The time of a first contact, never late.
+def _time(t: float, towards: Callable[[float], int]) -> str:
+    """A time of a motion, rounded to the safe side.
 
-    >>> first_text(0.12349), first_text(0.9), first_text(1.0)
+    >>> _time(0.12349, math.floor), _time(0.9, math.floor), _time(1.0, math.floor)
     ('0.1234', '0.9000', '1.0000')
     """
-    return f"{math.floor(round(t * 1e4, 6)) / 1e4:.4f}"
+    return f"{towards(round(t * 1e4, 6)) / 1e4:.4f}"
 
 
 def group_text(group: Group, names: Mapping[str, str]) -> str:
@@ -235,7 +232,6 @@ def where_text(where: Overlap) -> str:
     """The volume that two parts share, with certain digits only, and the box around it.
 
     >>> import numpy as np
-    >>> from clamp3d.engine.where import Overlap
     >>> where_text(Overlap((12.3412, 12.3419), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.04]])))
     'shared volume 12.34 mm3, within X 0 to 3, Y 1 to 4, Z 2 to 5.1 mm'
     >>> where_text(Overlap((0.2, 12.0), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), of_facets=True))
