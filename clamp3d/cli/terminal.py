@@ -65,14 +65,12 @@ def finish(finding: bool = False, *, failed: bool = False, verdicts: Collection[
     from clamp3d.engine.result import BAD
     from clamp3d.engine.verdict import Verdict
 
-    codes = (
-        (finding or any(verdict in verdicts for verdict in BAD), ExitCode.FINDING),
-        (failed or Verdict.FAILED in verdicts, ExitCode.FAILED),
-        (Verdict.UNCERTAIN in verdicts, ExitCode.UNDECIDED),
-    )
-    code = next((code for true, code in codes if true), ExitCode.CLEAN)
-    if code:
-        raise click.exceptions.Exit(code)
+    if finding or any(verdict in verdicts for verdict in BAD):
+        raise click.exceptions.Exit(ExitCode.FINDING)
+    if failed or Verdict.FAILED in verdicts:
+        raise click.exceptions.Exit(ExitCode.FAILED)
+    if Verdict.UNCERTAIN in verdicts:
+        raise click.exceptions.Exit(ExitCode.UNDECIDED)
 
 
 STDOUT_TAKEN = "clamp3d.stdout"
