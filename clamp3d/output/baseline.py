@@ -80,7 +80,7 @@ def compare(
     if baseline is None:
         return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {}, accepted)
     before = Baseline.read(baseline)
-    earlier = {key for _, keys in before.groups for key in keys}
+    earlier = {key for old in before.groups for key in _keys(old["pairs"], old["motion"], old["verdict"])}
     status: dict[str, Status] = {}
     changed: dict[str, tuple[Names, ...]] = {}
     now = set[Key]()
@@ -97,7 +97,8 @@ def compare(
         if new or different:
             changed[group.id] = tuple(pair for pair in pairs if pair in new | different)
     gone = []
-    for old, keys in before.groups:
+    for old in before.groups:
+        keys = _keys(old["pairs"], old["motion"], old["verdict"])
         lost = [pair for pair, key in zip(old["pairs"], keys, strict=True) if key not in now]
         if lost:
             gone.append({**old, "pairs": lost, "count": len(lost)})
@@ -136,48 +137,38 @@ class _Part(msgspec.Struct):
     T_world: list[list[float]]
 
 
-class _Check(msgspec.Struct):
-    """What is compared of a result that ``check --json`` wrote."""
+class Baseline(msgspec.Struct, dict=True):
+    """What is compared of a result that ``check --json`` wrote: groups, rows, and where the parts stood."""
 
     groups: list[_Group]
     pairs: list[_Row]
     motions: list[_Row]
     parts: dict[str, _Part]
 
-
-@dataclass(frozen=True, slots=True)
-class Baseline:
-    """An earlier check: its groups, verdict and bounds of its rows, and where its parts stood."""
-
-    groups: Sequence[tuple[_Group, list[Key]]]
-    rows: Mapping[tuple[str | None, ...], tuple[str, float | None, float | None]]
-    poses: Mapping[str, Array]
+    def __post_init__(self) -> None:
+        poses = check_pose_array([part.T_world for part in self.parts.values()]) if self.parts else ()
+        self.poses: dict[str, Array] = dict(zip(self.parts, poses, strict=True))
+        self.rows = {(*sorted((row.a, row.b)), row.motion): row for row in (*self.pairs, *self.motions)}
 
     @classmethod
     def read(cls, path: Path) -> Baseline:
         """From the JSON of a check. Raises InputError for a file that is none."""
         try:
-            data = msgspec.convert(json.loads(path.read_text(encoding="utf-8")), _Check)
-            rows = {
-                (*sorted((row.a, row.b)), row.motion): (row.verdict, row.at_least_mm, row.at_most_mm)
-                for row in (*data.pairs, *data.motions)
-            }
-            poses = check_pose_array([part.T_world for part in data.parts.values()]) if data.parts else ()
+            return msgspec.convert(json.loads(path.read_text(encoding="utf-8")), cls)
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError):
             raise InputError(f"{path}: not a result of `clamp3d check --json` with groups of findings") from None
-        groups = [(old, _keys(old["pairs"], old["motion"], old["verdict"])) for old in data.groups]
-        return cls(groups, rows, dict(zip(data.parts, poses, strict=True)))
 
     def differs(self, scene: Scene, row: PairResult) -> bool:
         """Whether the verdict of a pair, its distance or its parts' places to each other have changed."""
-        verdict, least, most = self.rows.get((*sorted((row.a, row.b)), row.motion), ("", None, None))
+        old = self.rows.get((*sorted((row.a, row.b)), row.motion))
+        if old is None or old.verdict != row.verdict or row.a not in self.poses or row.b not in self.poses:
+            return True
         slack = max(_CHANGED, _CHANGED_SHARE * abs(row.distance.upper))
-        lower, upper = row.distance.lower, row.distance.upper
-        farther = most is not None and lower > most + slack
-        deeper = least is not None and upper < least - slack
-        if verdict != row.verdict or farther or deeper or row.a not in self.poses or row.b not in self.poses:
+        is_farther = old.at_most_mm is not None and row.distance.lower > old.at_most_mm + slack
+        is_deeper = old.at_least_mm is not None and row.distance.upper < old.at_least_mm - slack
+        if is_farther or is_deeper:
             return True
         now = inverse(_pose(scene, row.a)) @ _pose(scene, row.b)
         return not _same(now, inverse(self.poses[row.a]) @ self.poses[row.b])
