@@ -130,7 +130,10 @@ def export(
     if not isinstance(source, Clamp):
         source = opened(source if result is None else result.scene)
     mesh_error = check_mesh_error(mesh_error)
-    file, settings = _settings(source, path, format, layout, unit, mesh_error)
+    chosen, file = destination(path, format)
+    settings = _settings(chosen, file, layout, unit, mesh_error)
+    if settings["layout"] == "assembly" and isinstance(source, Clamp):
+        raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
     shown, state_settings = _at_state(source, state)
     placed = tuple(_coloured(place(shown, names), result))
     if result is not None:
@@ -146,33 +149,25 @@ def export(
 
 
 def _settings(
-    source: Clamp | Scene | Assembly,
-    path: str | Path,
-    format: str | None,
-    layout: Layout | None,
-    unit: str | None,
-    mesh_error: float,
-) -> tuple[Path | None, dict[str, Any]]:
-    """The file (None: into a folder) and the choices of an export with their defaults, as the manifest says them first.
+    format: Format, file: Path | None, layout: Layout | None, unit: str | None, mesh_error: float
+) -> dict[str, Any]:
+    """The choices of an export into a ``file`` (None: a folder) with their defaults, as the manifest says them first.
 
     Raises InputError for those that do not go together.
     """
-    chosen, file = destination(path, format)
     if layout is None:
-        layout = "assembly" if file else default_layout(chosen)
+        layout = "assembly" if file else default_layout(format)
     checks.choice("layout", layout, LAYOUTS)
     if unit is None:
-        unit = "m" if chosen == "glb" else "mm"
+        unit = "m" if format == "glb" else "mm"
     checks.choice("unit", unit, UNITS_MM)
-    if chosen == "glb" and unit != "m":
+    if format == "glb" and unit != "m":
         raise InputError(f"unit of glb must be m, as glTF 2.0 demands, got {checks.shown(unit)}")
     if file is not None and layout == "parts":
         raise InputError(f"layout parts needs a folder, got the file {file}")
-    if layout == "assembly" and isinstance(source, Clamp):
-        raise InputError("layout assembly needs poses: assemble the clamp first, or its parts would lie on one origin")
-    error = None if chosen == "step" else mesh_error
-    up = "Y" if chosen == "glb" else "Z"
-    return file, {"format": chosen, "layout": layout, "unit": unit, "up": up, "mesh_error_mm": error}
+    error = None if format == "step" else mesh_error
+    up = "Y" if format == "glb" else "Z"
+    return {"format": format, "layout": layout, "unit": unit, "up": up, "mesh_error_mm": error}
 
 
 def _at_state(source: Clamp | Scene | Assembly, state: str | None) -> tuple[Clamp | Scene, dict[str, Any]]:
@@ -209,30 +204,27 @@ def _coloured(placed: Iterable[PlacedPart], result: CheckResult | None) -> Itera
             yield replace(item, colour=component.colour or colours.setdefault(id(item.shape), item.colour))
 
 
-def _shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error: float | None) -> list[PlacedPart]:
+def _shared_bodies(result: CheckResult, placed: Sequence[PlacedPart], mesh_error: float | None) -> Iterator[PlacedPart]:
     """The common part of each two of the ``placed`` parts that clash at rest, in the world, in red.
 
     Of the facets within ``mesh_error`` mm, or with exact faces where that is None. Pairs whose common part has no
     volume are left out.
     """
     parts = {part.name: part for part in placed}
-    rows = [row for row in result.pairs if row.verdict in BAD and {row.a, row.b} <= parts.keys()]
-    bodies = []
-    for row in rows:
-        name, (a, b) = f"clash {row.a} - {row.b}", (parts[row.a], parts[row.b])
-        shape = _exact_common(name, a, b) if mesh_error is None else _faceted_common(name, a, b, mesh_error)
-        if shape is not None:
-            bodies.append(PlacedPart(name, shape, np.eye(4), VERDICT_COLOURS["clash"]))
-    return bodies
+    for row in result.pairs:
+        if row.verdict in BAD and {row.a, row.b} <= parts.keys():
+            name = f"clash {row.a} - {row.b}"
+            shape = _common(name, (parts[row.a], parts[row.b]), mesh_error)
+            if shape is not None:
+                yield PlacedPart(name, shape, np.eye(4), VERDICT_COLOURS["clash"])
 
 
-def _exact_common(name: str, a: PlacedPart, b: PlacedPart) -> BrepSolid | None:
-    shape: Any = occ.BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in (a, b))).Shape()
-    return BrepSolid.of(shape, name) if volume_of(shape) > 0.0 else None
-
-
-def _faceted_common(name: str, a: PlacedPart, b: PlacedPart, mesh_error: float) -> MeshShape | None:
-    common = overlap(*posed([a, b], mesh_error))
+def _common(name: str, pair: tuple[PlacedPart, PlacedPart], mesh_error: float | None) -> BrepSolid | MeshShape | None:
+    """The common part of two parts as a body of its own."""
+    if mesh_error is None:
+        exact: Any = occ.BRepAlgoAPI_Common(*(moved(exact_solid(item), item.T) for item in pair)).Shape()
+        return BrepSolid.of(exact, name) if volume_of(exact) > 0.0 else None
+    common = overlap(*posed(pair, mesh_error))
     return None if common is None else MeshShape(make_mesh(common.vertices, common.faces), name=name)
 
 
