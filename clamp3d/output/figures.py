@@ -149,8 +149,7 @@ def _enlarge(ax: Axes, run: Assembly, contact: Contact, number: str = "") -> Non
         half *= 4.0  # nearest across the section: a bolt in its hole, which is seen whole
     heading = f"{number}{contact.a} and {contact.b}: {contact.relation.replace('none', 'apart')}"
     ax.set_title(f"{heading}\n{below}", fontsize=8, loc="left", color=INK)
-    ax.set_xticks([])
-    ax.set_yticks([])
+    ax.set(xticks=[], yticks=[])
     if contact.point is None:
         return
     x, y = float(contact.point[0]), -float(contact.point[2])

@@ -58,8 +58,7 @@ def draw_section(
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.margins(0.02)
-    if not ax.yaxis_inverted():
-        ax.invert_yaxis()
+    ax.yaxis.set_inverted(True)
     bodies = parts(clamp)
     for zorder, name in enumerate(_ORDER, 2):
         if name in only and name in poses:

@@ -157,8 +157,7 @@ def draw_solids(
         for solid in layer:
             lines, colour = raster.visible_edges(solid), darker(solid.colour, 0.4)
             ax.add_collection(LineCollection(lines, colors=colour, linewidths=0.6, zorder=zorder + 0.5))
-    ax.set_xlim(*raster.extent[:2])
-    ax.set_ylim(*raster.extent[2:])
+    ax.set(xlim=raster.extent[:2], ylim=raster.extent[2:])
     return raster
 
 
