@@ -32,13 +32,11 @@ def stl(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
     """
-    from trimesh.exchange.stl import export_stl
-
     _check_rounding("stl", items, unit)
     header = f"clamp3d {title}; unit {unit}; Z up".encode("ascii", "replace")[:80].ljust(80, b" ")
     mesh = _joined(items, unit)
     mesh.vertices = mesh.vertices.astype(np.float32)  # the normals in the file are those of its own corners
-    return header + bytes(export_stl(mesh))[80:]
+    return header + bytes(trimesh.exchange.stl.export_stl(mesh))[80:]
 
 
 def ply(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
@@ -46,12 +44,11 @@ def ply(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
     """
-    from trimesh.exchange.ply import export_ply
-
     _check_rounding("ply", items, unit)
     lines = [f"comment clamp3d {title}", f"comment unit {unit}, Z up", *(f"comment part {i.label}" for i in items)]
     comments = "".join(f"{line}\n" for line in lines).encode("ascii", "replace")
-    start, vertices, rest = bytes(export_ply(_joined(items, unit), vertex_normal=False)).partition(b"element vertex")
+    content = bytes(trimesh.exchange.ply.export_ply(_joined(items, unit), vertex_normal=False))
+    start, vertices, rest = content.partition(b"element vertex")
     return start + comments + vertices + rest
 
 
