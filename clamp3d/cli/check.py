@@ -5,22 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import click
+
 from clamp3d.checks import note_read, short
 from clamp3d.clamp.loader import builtin_clamps
 from clamp3d.clamp.result import Assembly
-from clamp3d.cli.options import (
-    JSON,
-    RESULT_FILE,
-    SOURCE,
-    Output,
-    Quiet,
-    Source,
-    argument,
-    command,
-    couples,
-    number,
-    option,
-)
+from clamp3d.cli.options import JSON, SOURCE, Output, Quiet, Source, argument, command, couples, number, option
 from clamp3d.cli.terminal import bar, finish, save, show
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.check import check
@@ -70,7 +60,7 @@ class Check(Source, Quiet):
     distances: bool = option("Measure every pair, not only as finely as its verdict needs, and depths with more work.")
     baseline: Path | None = option(
         "Compare with this result of an earlier check --json; then only new findings count for the exit code.",
-        type=RESULT_FILE,
+        type=click.Path(dir_okay=False, path_type=Path),  # no INPUT_FILE: the new result may replace it
         metavar="LAST.json",
     )
     json_file: Path | None = JSON

@@ -90,8 +90,6 @@ SOURCE = click.Path(readable=False)
 """What `clamp3d.load` takes as a text: the shell completes it as a file."""
 INPUT_FILE = click.Path(dir_okay=False, path_type=Path)
 """A file that is read, over which nothing is written."""
-RESULT_FILE = click.Path(dir_okay=False, path_type=Path)
-"""An earlier result, which the new one may replace."""
 PICTURE = Output((".png", ".svg", ".pdf"))
 FOLDER = click.Path(file_okay=False, path_type=Path)
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from clamp3d import checks
+from clamp3d.clamp.result import Assembly
 from clamp3d.cli.options import JSON, ClampSource, Method, command, number, option
 from clamp3d.cli.terminal import finish, save, show
 from clamp3d.cli.view import Viewing
 from clamp3d.errors import SequenceError
 from clamp3d.output.run_report import bands_to_text, measured_to_text, run_to_text, tightening_to_text
-
-if TYPE_CHECKING:
-    from clamp3d.clamp.result import Assembly
 
 
 def numbers(text: str) -> tuple[float, ...]:
