@@ -14,7 +14,7 @@ from clamp3d.cli.terminal import bar, finish, show
 from clamp3d.engine.check import check
 from clamp3d.engine.result import CheckResult
 from clamp3d.engine.scene import Scene
-from clamp3d.output.export import Format, Layout, default_layout, destination, export
+from clamp3d.output.export import DEFAULT_MESH_ERROR, Format, Layout, default_layout, destination, export
 from clamp3d.output.files import check_folder
 
 
@@ -46,7 +46,7 @@ class Export(Source, Quiet):
         metavar="open|final|STEP",
     )
     sequence: str | None = SEQUENCE
-    mesh_error: float = option("Chord error of meshes.", default=0.01, metavar="MM")
+    mesh_error: float = option("Chord error of meshes.", default=DEFAULT_MESH_ERROR, metavar="MM")
     clashes: bool = option("Check the parts, and add what clashing parts have in common as red bodies.", "--clashes")
     file_unit: Unit | None = option("Unit of the file.  [default: mm; m for glb]", "--unit")
 

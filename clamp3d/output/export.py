@@ -34,7 +34,6 @@ from clamp3d.scenefile.check import opened
 Format: TypeAlias = Literal["stl", "obj", "ply", "glb", "3mf", "step"]
 Layout: TypeAlias = Literal["parts", "assembly"]
 FORMATS: tuple[Format, ...] = get_args(Format)
-LAYOUTS: tuple[Layout, ...] = get_args(Layout)
 
 DEFAULT_MESH_ERROR = 0.01
 """Chord error in mm where none is chosen."""
@@ -157,7 +156,7 @@ def _settings(
     """
     if layout is None:
         layout = "assembly" if file else default_layout(format)
-    checks.choice("layout", layout, LAYOUTS)
+    checks.choice("layout", layout, get_args(Layout))
     if unit is None:
         unit = "m" if format == "glb" else "mm"
     checks.choice("unit", unit, UNITS_MM)
