@@ -19,6 +19,7 @@ import click
 import clamp3d
 from clamp3d.cli.terminal import ExitCode, end_on_signals, prepare_streams, show
 from clamp3d.errors import EXTRAS, Clamp3dError, NotClampedError, SequenceError, SolverError, missing, one_line
+from clamp3d.output.pages import now
 
 # Name -> (module and class, one line for the list of commands). A module is loaded when its command is called.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -153,7 +154,4 @@ def _check_environment() -> None:
     """Libraries read it when they are imported (numpy.f2py does), and end with errors of their own."""
     if os.environ.get("SOURCE_DATE_EPOCH") == "":
         del os.environ["SOURCE_DATE_EPOCH"]
-    elif "SOURCE_DATE_EPOCH" in os.environ:
-        from clamp3d.output.pages import now
-
-        now()
+    now()
