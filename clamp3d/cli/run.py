@@ -104,10 +104,10 @@ class Run(ClampSource, Method, Mechanics, Viewing):
         has_page = self.view or self.html_file is not None or self.url is not None
         try:
             if has_page:
-                result = self.view_assembly(clamp, model, settings, serve=self.view, done=self._show)
+                result = self.view_assembly(clamp, model, settings, serve=self.view)
             else:
                 result = self.assemble(clamp, model, settings)
-                self._show(result)
+                self.tell(result)
         except SequenceError as error:
             data: dict[str, Any] = {
                 "status": f"not assembled: {error}",
@@ -120,7 +120,8 @@ class Run(ClampSource, Method, Mechanics, Viewing):
             finish(True)
         finish(not result.passed)
 
-    def _show(self, result: Assembly) -> None:
-        text, data = self.mechanics(result)  # first: it may refuse a value
-        show("\n".join(filter(None, [run_to_text(result), text])))
-        save(self.json_file, lambda: result.to_dict() | data)
+    def tell(self, run: Assembly) -> None:
+        """Print and write the result."""
+        text, data = self.mechanics(run)  # first: it may refuse a value
+        show("\n".join(filter(None, [run_to_text(run), text])))
+        save(self.json_file, lambda: run.to_dict() | data)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,16 +56,11 @@ class Viewing(Quiet):
     draw_error: float = option("Chord error of drawn facets.", default=0.01, metavar="MM")
     clearance: float | None = CLEARANCE
 
-    def view_assembly(
-        self,
-        clamp: Clamp,
-        model: ContactModel,
-        settings: dict[str, Any],
-        *,
-        serve: bool,
-        done: Callable[[Assembly], None] = lambda run: None,
-    ) -> Assembly:
-        """Assemble on the page, waypoint by waypoint; call ``done`` with the result before the page is waited on.
+    def tell(self, run: Assembly) -> None:
+        """Say the result of an assembly before its page is waited on: nothing where the page is all that was asked."""
+
+    def view_assembly(self, clamp: Clamp, model: ContactModel, settings: dict[str, Any], *, serve: bool) -> Assembly:
+        """Assemble on the page, waypoint by waypoint.
 
         A sequence other than the paper's is assembled first: all its ways are computed before anything moves, and if
         one is blocked there is another page to show.
@@ -81,7 +76,7 @@ class Viewing(Quiet):
             run = finished or self.assemble(clamp, model, settings, viewer.show)
             viewer.finish(run)
             self._save(viewer)
-            done(run)
+            self.tell(run)
         return run
 
     def view_scene(self, scene: Scene, *, serve: bool) -> CheckResult:
