@@ -110,18 +110,8 @@ class Report:
         """The stages of the nut's own step."""
         return list(assembly_steps.tightening(self.assembly)) if self.assembly else []
 
-    @property
-    def modelled(self) -> list[str]:
-        """What the numbers stand on."""
-        return self._items("modelled.txt")
-
-    @property
-    def not_modelled(self) -> list[str]:
-        """What the numbers leave out."""
-        return self._items("not_modelled.txt")
-
-    def _items(self, template: str) -> list[str]:
-        """The items of a text in ``templates``, which stand one a line."""
+    def items(self, template: str) -> list[str]:
+        """The items of a text in ``templates``, one a line: what the numbers stand on, or what they leave out."""
         names = {name: " ".join(title.split()) for name, title in titles(self.scene).items()}
         lines = render(template, scene=self.scene, assembly=self.assembly, titles=names).splitlines()
         return [line for line in lines if line.strip()]

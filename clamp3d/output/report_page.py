@@ -88,8 +88,8 @@ def report_to_dict(report: Report) -> dict[str, Any]:
         ],
         "pairs": [_pair_to_dict(row) for row in report.rows],
         "motions": [_pair_to_dict(row) for row in report.motions],
-        "modelled": report.modelled,
-        "not_modelled": report.not_modelled,
+        "modelled": report.items("modelled.txt"),
+        "not_modelled": report.items("not_modelled.txt"),
     }
 
 
