@@ -50,11 +50,11 @@ def save(path: Path | None, make: Callable[[], dict[str, Any] | str]) -> None:
     """Write what ``make`` gives to a file, if there is to be one: a text as it is, anything else as JSON."""
     if path is None:
         return
-    from clamp3d.output.files import write_json, write_text
+    from clamp3d.output.files import json_text, write_text
 
     content = make()
     with suppress(BrokenPipeError):
-        write_text(path, content) if isinstance(content, str) else write_json(path, content)
+        write_text(path, content if isinstance(content, str) else json_text(content))
 
 
 def finish(finding: bool = False, *, failed: bool = False, verdicts: Collection[str] = ()) -> None:

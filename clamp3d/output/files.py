@@ -94,9 +94,9 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
-def write_json(path: Path, data: Any) -> None:
-    """Write ``data`` as JSON without NaN. Raises InputError if it cannot be written."""
-    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+def json_text(data: Any) -> str:
+    """What a JSON file of ``data`` holds; NaN is an error."""
+    return json.dumps(data, indent=2, allow_nan=False) + "\n"
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> list[Path]:

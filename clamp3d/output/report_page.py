@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
 import platform
 from collections.abc import Callable, Iterator
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clamp3d import __version__
-from clamp3d.output.files import write_files
+from clamp3d.output.files import json_text, write_files
 from clamp3d.output.manifest import versions
 from clamp3d.output.pages import now, render
 from clamp3d.output.palette import DIMENSION, INK, part_colours
@@ -45,7 +44,7 @@ def write_report(report: Report, folder: Path, *, progress: Callable[[str], None
     Raises InputError if the folder cannot be written to.
     """
     page = report_html(report, progress=progress)
-    data = json.dumps(report_to_dict(report), indent=2, allow_nan=False) + "\n"
+    data = json_text(report_to_dict(report))
     files = {"report.html": page, "report.json": data, "pairs.csv": report_csv(report)}
     return write_files(folder, {name: text.encode("utf-8", "backslashreplace") for name, text in files.items()})
 
