@@ -310,6 +310,22 @@ def test_samples_that_cannot_decide_an_interference_are_given_up_but_for_the_fin
     assert -0.0107 < answers[2][1] <= -0.0101
 
 
+def test_a_face_of_a_common_part_without_triangles_leaves_the_others_as_they_are(monkeypatch):
+    a, b = (to_bytes(solid) for solid in (block((0, 0, 0), (10, 10, 10)), block((1, 2, 9), (8, 7, 20))))
+    whole = pairs.common(a, b, np.eye(4), 0.04)
+    sample, faces = pairs._samples, []
+
+    def without_the_first(*given):
+        faces.append(given)
+        return [x[:0] for x in sample(*given)] if len(faces) == 1 else sample(*given)
+
+    monkeypatch.setattr(pairs, "_samples", without_the_first)
+    borders = pairs.common(a, b, np.eye(4), 0.04).borders
+    assert len(faces) == 6
+    lost = sum(len(border.triangles) for border in whole.borders) - sum(len(border.triangles) for border in borders)
+    assert 0 < lost == len(sample(*faces[0])[0])
+
+
 @pytest.mark.parametrize("lost", [1, 2, 3])
 def test_what_a_mesh_leaves_out_of_a_face_is_not_overlooked(lost, monkeypatch):
     """As Open CASCADE does of slender plane faces: with finer edges it may not; if it always does nothing is known."""
