@@ -288,3 +288,13 @@ def test_work_grows_with_the_parts(step):
     run(few)  # what is made once
     grown = calls(lambda: run(many)) / calls(lambda: run(few))
     assert grown <= 1.3 * SIZES[1] / SIZES[0], f"{step}: {grown:.1f} times the work for 4 times the parts"
+
+
+def test_bounds_of_many_poses_hold_the_gap_and_say_nothing_of_how_deep_an_overlap_is():
+    scene = Scene(clearance=5.0).add("ring", shapes.cylinder(9.0, 8.0, bore=4.0)).add("pin", shapes.cylinder(3.0, 40.0))
+    poses = check_poses(scene, "pin", [translation(x, 0.0, 0.0) for x in (0.0, 0.6, 2.0)])
+    assert poses.verdict[:, 0].tolist() == ["clearance", "clearance", "clash"]
+    for lower, upper, gap in zip(poses.lower[:2, 0], poses.upper[:2, 0], (1.0, 0.4), strict=True):
+        assert 0.0 < lower <= gap <= upper < np.inf
+    assert poses.lower[2, 0] == -np.inf
+    assert -1.0 - 1e-9 <= poses.upper[2, 0] < 0.0
