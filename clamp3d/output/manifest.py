@@ -33,7 +33,8 @@ def manifest(
 
     Volumes are mm^3, poses mm; ``bounds`` are in the unit and axes of the files. Of a drawn solid whose volume has no
     closed form ``volume_mm3`` is null and ``volume_bounds_mm3`` says between what it lies; of a mesh only the mesh's
-    own is given. Holds no date: same input, same bytes.
+    own is given. Holds no date: same input, same bytes, but for STEP, some lines of which Open CASCADE orders anew in
+    each process.
     """
     libraries = ["manifold3d", "trimesh", "numpy"] if meshed else ["cadquery-ocp-novtk", "numpy"]
     if settings["format"] == "3mf":
