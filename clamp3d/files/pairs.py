@@ -38,7 +38,7 @@ _BESIDE = 0.05
 """How far (mm) beside a point nearer ones are looked for first."""
 _ONE_BALL = 1e-7
 """How far (mm) centres and radii of faces may differ that are one ball's."""
-_COARSER = 64.0
+_COARSER = 16.0
 """How much coarser Open CASCADE meshes the inside of a common part's faces than their edges."""
 _FINER_EDGES = (1.0, 0.3, 0.1)
 """Shares of a chord that a common part's edges are meshed with, until all of its faces have triangles."""
