@@ -18,7 +18,6 @@ from clamp3d.clamp.dimensions import ClampPart, Length, Offset, check_conductor
 from clamp3d.clamp.loader import load_clamp
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError
-from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry import shapes
 from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import to_target
@@ -167,7 +166,7 @@ class MeshTable(FileTable, kw_only=True):
         (part,) = scene.parts
         if np.array_equal(part.T_world, np.eye(4)):
             return scene
-        if not isinstance(part.shape, shapes.MeshShape) or isinstance(part.shape, BrepSolid):
+        if type(part.shape) is not shapes.MeshShape:  # solids and spheres are not their triangles
             raise InputError(f"{self.file} places its body itself: leave out shape, and it is placed so")
         mesh = replace(part.shape.mesh, vertices=to_target(part.T_world, part.shape.mesh.vertices))
         return replace(scene, parts=(replace(part, shape=replace(part.shape, mesh=mesh), T_world=np.eye(4)),))

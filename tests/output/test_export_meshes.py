@@ -95,6 +95,17 @@ def test_a_mesh_of_one_part_stands_in_the_frame_of_its_file(tmp_path):
     np.testing.assert_allclose(read.shape.mesh.vertices.max(axis=0), [10.5, 21.0, 31.5], atol=1e-5)
 
 
+def test_a_placed_ball_of_a_robot_is_no_mesh_in_its_file(tmp_path):
+    (tmp_path / "ball.urdf").write_text(
+        '<robot name="r"><link name="l"><collision><origin xyz="0.01 0.02 0.03"/>'
+        '<geometry><sphere radius="0.004"/></geometry></collision></link></robot>',
+        encoding="utf-8",
+    )
+    (tmp_path / "cell.toml").write_text('[parts.ball]\nshape = "mesh"\nfile = "ball.urdf"\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"ball\.urdf places its body itself: leave out shape"):
+        load(tmp_path / "cell.toml")
+
+
 def test_glb_is_y_up_with_named_coloured_nodes(odd_poses, odd_scene, tmp_path):
     written = export(odd_scene, tmp_path, format="glb", mesh_error=MESH_ERROR)
     tree = read_glb(written.files[0])
