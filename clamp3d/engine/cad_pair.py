@@ -40,7 +40,7 @@ class CadPair:
     def levels(self, closed_forms: Levels) -> Levels:
         """All levels; ``closed_forms`` come after those that take less time."""
         if self._chords:
-            yield self._meshes(self._chords[0])
+            yield "meshes", self._meshes(self._chords[0])
         yield from self._nearest()
         if self._attested <= _COINCIDENT:
             yield from self._fine_meshes(quick=True)
@@ -50,7 +50,7 @@ class CadPair:
         yield from self._common_part(quick=False)
         yield from self._fine_meshes(quick=False)
         if CAD_CHORDS[-1] not in self._chords:  # Open CASCADE did not find the common part
-            yield self._meshes(CAD_CHORDS[-1], thorough=True)
+            yield "meshes", self._meshes(CAD_CHORDS[-1], thorough=True)
 
     def _nearest(self) -> Levels:
         """What some points attest, and Open CASCADE's distance, which is bound by what contradicts it now and then."""
@@ -68,10 +68,11 @@ class CadPair:
         # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
         yield "exact", unproven
         if self._is_small:
-            name, meshes = next(self._fine_meshes(quick=True))
+            chord, self._has_fine_meshes = self._chords[-1], False
         else:
-            name, meshes = self._meshes(max(self.a.fine_chord, self.b.fine_chord))
-        yield name, meshes
+            chord = max(self.a.fine_chord, self.b.fine_chord)
+        meshes = self._meshes(chord)
+        yield "meshes", meshes
         if distance.lower <= meshes.upper:
             yield "exact", distance
 
@@ -79,7 +80,7 @@ class CadPair:
         """What fine meshes say, once; ``quick``: only where that takes less time than Open CASCADE."""
         if self._has_fine_meshes and (self._is_small or not quick):
             self._has_fine_meshes = False
-            yield self._meshes(self._chords[-1])
+            yield "meshes", self._meshes(self._chords[-1])
 
     def _common_part(self, *, quick: bool) -> Levels:
         """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
@@ -89,25 +90,26 @@ class CadPair:
         if self._has_common_part:
             return
         for share in SHARES:
-            is_last = share == SHARES[-1]
-
-            def end(bounds: Distance, closest: Distance, is_last: bool = is_last) -> bool:
-                if self.enough(closest):
-                    return self.enough(bounds)
-                return not is_last or bounds.lower >= _OPEN * closest.lower  # finer samples may decide it
-
-            is_quick = quick and share == SHARES[0]
-            overlap = exact_overlap(self.a, self.b, self.T, share, end=end, quick=is_quick, attested=self._attested)
+            overlap = self._overlap(share, quick=quick and share == SHARES[0])
             yield "exact", overlap
             if np.isinf(overlap.lower):
                 break
             self._has_common_part = True
 
-    def _meshes(self, chord: float, *, thorough: bool = False) -> tuple[str, Distance]:
+    def _overlap(self, share: float, *, quick: bool) -> Distance:
+        """What one of `SHARES` says of the common part, sharpened until that is enough, or finer samples are to."""
+
+        def end(bounds: Distance, closest: Distance) -> bool:
+            if self.enough(closest):
+                return self.enough(bounds)
+            return share != SHARES[-1] or bounds.lower >= _OPEN * closest.lower  # finer samples may decide it
+
+        return exact_overlap(self.a, self.b, self.T, share, end=end, quick=quick, attested=self._attested)
+
+    def _meshes(self, chord: float, *, thorough: bool = False) -> Distance:
         """What meshes say; nothing where they take too long to make."""
         cuts = CUTS if thorough else FEW_CUTS
         try:
-            bounds = meshes_distance(self.a, self.b, self.T, chord, self.enough, thorough=thorough, cuts=cuts)
-            return "meshes", bounds
+            return meshes_distance(self.a, self.b, self.T, chord, self.enough, thorough=thorough, cuts=cuts)
         except Clamp3dError:
-            return "meshes", Distance(method="without fine meshes")
+            return Distance(method="without fine meshes")
