@@ -11,11 +11,11 @@ import numpy as np
 from clamp3d.clamp.contact import measure_contacts
 from clamp3d.clamp.dimensions import PartName
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.section import Section
+from clamp3d.clamp.section import WIRES, Section
 from clamp3d.clamp.status import Seat, seats
 from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.geometry.pose import SectionPose
-from clamp3d.output.section import WIRES, Poses, edge_openings
+from clamp3d.output.section import Poses, edge_openings
 
 TIGHTENING_STAGES = 4
 _PARALLEL = math.radians(0.005)  # the angle that prints as 0.00 deg

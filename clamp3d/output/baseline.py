@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -80,7 +81,8 @@ def compare(
     if baseline is None:
         return Comparison({g.id: "accepted" if g.id in accepted else "new" for g in groups}, {}, accepted)
     before = Baseline.read(baseline)
-    earlier = {key for old in before.groups for key in _keys(old["pairs"], old["motion"], old["verdict"])}
+    keys_before = [_keys(old["pairs"], old["motion"], old["verdict"]) for old in before.groups]
+    earlier = set(itertools.chain.from_iterable(keys_before))
     status: dict[str, Status] = {}
     changed: dict[str, tuple[Names, ...]] = {}
     now = set[Key]()
@@ -97,8 +99,7 @@ def compare(
         if new or different:
             changed[group.id] = tuple(pair for pair in pairs if pair in new | different)
     gone = []
-    for old in before.groups:
-        keys = _keys(old["pairs"], old["motion"], old["verdict"])
+    for old, keys in zip(before.groups, keys_before, strict=True):
         lost = [pair for pair, key in zip(old["pairs"], keys, strict=True) if key not in now]
         if lost:
             gone.append({**old, "pairs": lost, "count": len(lost)})

@@ -17,6 +17,7 @@ from shapely.plotting import patch_from_polygon
 
 from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
 from clamp3d.clamp.parts import parts
+from clamp3d.clamp.section import WIRES
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.geometry.profile import Arc, Point, Profile
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 Poses = Mapping[PartName, SectionPose]
 
-WIRES: tuple[PartName, ...] = ("P6", "P7")
 ARROW: dict[str, Any] = {
     "arrowstyle": "-|>,head_width=0.18,head_length=0.45",
     "color": DIMENSION,

@@ -63,7 +63,8 @@ def recorded(value):
         return [recorded(item) for item in value]
     if not isinstance(value, dict):
         return round(value, 6) if isinstance(value, float) else value
-    places = set() if value.get("unique", not PLACED & set(value)) is True else PLACES
+    is_open = bool(PLACED & set(value)) and value.get("unique") is not True
+    places = PLACES if is_open else set()
     return {key: recorded(item) for key, item in value.items() if key not in NOT_RECORDED | places}
 
 
