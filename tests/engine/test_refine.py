@@ -130,6 +130,21 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 
 
+def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(monkeypatch):
+    made = []
+
+    class Formed(SimpleNamespace):
+        quick_bodies = property(made.append)
+
+    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
+    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
+    monkeypatch.setattr(cad_pair, "exact_overlap", lambda *_, **__: Distance(-5.0, method="common part"))
+    a = Formed(exact=1, is_simple=True, chords=())
+    answers = refine._levels(a, a, np.eye(4), lambda _: False, False)
+    before = [next(answers)[1].method for _ in range(5)]
+    assert (before, made) == (["probe", "distance", *["common part"] * 3], [])
+
+
 def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
     for a, b, error, chords in (
         ((0.1, 0.02), (0.05, 0.01), 0.03, [0.05, 0.02, 0.01]),
