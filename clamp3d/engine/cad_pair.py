@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
+from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.exact import SHARES, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
 from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Model
@@ -41,6 +42,9 @@ class CadPair:
         """All levels; ``closed_forms`` come after those that take less time."""
         if self._chords:
             yield "meshes", self._meshes(self._chords[0])
+        sections = coaxial_distance(self.a, self.b, self.T, self.enough)
+        if sections is not None:
+            yield "sections", sections
         yield from self._nearest()
         if self._attested <= _COINCIDENT:
             yield from self._fine_meshes(quick=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from clamp3d.errors import SolverError
-from clamp3d.files import faces, open_cascade, pairs, tessellation
+from clamp3d.files import faces, open_cascade, pairs, tessellation, turned
 from clamp3d.files.child import WorkerEndedError, WorkerTimeoutError
 from clamp3d.files.worker import process
 
@@ -48,3 +48,4 @@ distance = _there(pairs.distance)
 common = _there(pairs.common, _COMMON_SECONDS)
 quick_common = _there(pairs.common, _QUICK_SECONDS)
 depths = _there(pairs.depths)
+turned_section = _there(turned.turned_section)

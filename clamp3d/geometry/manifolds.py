@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,3 +28,16 @@ def arrays_of(manifold: Any) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3) and faces (m, 3) of a solid of manifold3d."""
     mesh = manifold.to_mesh64()
     return np.array(mesh.vert_properties, dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64)
+
+
+def prism(loops: Sequence[Array], length: float) -> Any:
+    """What is inside of an odd number of outlines (n, 2), drawn ``length`` along z to both sides, as such a solid.
+
+    >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
+    >>> round(prism([corners, corners + (0.5, 0.0)], 5.0).volume(), 9)
+    10.0
+    """
+    import manifold3d
+
+    inside = manifold3d.CrossSection([loop.tolist() for loop in loops], manifold3d.FillRule.EvenOdd)
+    return inside.extrude(2.0 * length).translate((0.0, 0.0, -length))

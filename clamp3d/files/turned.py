@@ -1,0 +1,227 @@
+"""What of a solid is turned about an axis, and its section by a plane through that axis."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from clamp3d.files.faces import CONE, CYLINDER, PLANE, SPHERE, TORUS, Surfaces, surfaces
+from clamp3d.files.open_cascade import TOLERANCE, area_of, bounds_of, explore, from_bytes, moved, occ
+from clamp3d.geometry.pose import Array, inverse, to_target
+from clamp3d.geometry.profile import chord_angle, chord_count
+from clamp3d.geometry.triangles import distances_from_segments
+
+CHORD = 1e-5
+"""Chord error (mm) of sections: of curves in a plane it takes no more than thousands of corners."""
+_ALIKE, _PARALLEL = 1e-7, 1e-9
+"""How far (mm, rad) a surface may be from one that is turned about the axis, as Open CASCADE confuses points."""
+_ANGLES = (1.0, 2.2)
+"""Where about the axis (rad) sections are made, away from seams, which mostly are at 0."""
+PLANE_AT = np.array(
+    [
+        [math.cos(_ANGLES[0]), 0.0, 0.0, 0.0],
+        [math.sin(_ANGLES[0]), 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+"""Takes points of sections, off the axis and along it, to the axis' frame; a third coordinate is left out."""
+_BEYOND = 1.0
+"""How far (mm) what sections are cut out of reaches beyond the solid."""
+_OFF = 1e-5
+"""How far (mm) Open CASCADE's curve of a section may be off the line or circle that it is."""
+_APPROXIMATE = 1e-5
+"""How far the area of a section by Open CASCADE may be off for that, relative to it."""
+_SAMPLES = 17
+"""Points of a curve that are looked at, from which the turns about a circle's centre are told."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Section:
+    """The section of a solid by a plane through an axis: outlines ``loops`` (n, 2), off the axis and along it, mm.
+
+    What is inside of an odd number of loops is material. ``error``: how far (mm) they are off the true ones.
+    ``reach``: all planes give the same nearer to the axis than this, mm; what is farther is left out.
+    """
+
+    loops: tuple[Array, ...]
+    error: float
+    reach: float
+
+    @property
+    def radius(self) -> float:
+        """How far (mm) its points are from the axis."""
+        return max(float(np.abs(loop[:, 0]).max()) for loop in self.loops) + self.error
+
+
+def axis_of(form: Surfaces, about: Array | None = None) -> Array | None:
+    """A pose (4, 4) whose z is the axis of the first round surface; None if there is none.
+
+    ``about``: of the first that is turned about z of this pose, and z the same way.
+    """
+    is_round = (form.kind >= CYLINDER) & (form.kind <= TORUS) & (form.kind != SPHERE)
+    if about is not None:
+        is_round &= [place is not None for place in places_about(form, about)]
+    if not is_round.any():
+        return None
+    origin, _, y, z = form.frame[is_round.argmax()]
+    if about is not None:
+        z = z * math.copysign(1.0, float(z @ about[:3, 2]))
+    axis = np.eye(4)
+    axis[:3] = np.column_stack([np.cross(y, z), y, z, origin])  # Open CASCADE's own x may be left-handed
+    return axis
+
+
+def places_about(form: Surfaces, axis: Array) -> list[Array | None]:
+    """What tells surfaces that are turned about z of ``axis`` (4, 4) from each other; None for all others."""
+    T = inverse(axis)
+    every = zip(
+        form.kind.tolist(), to_target(T, form.frame[:, 0]), form.frame[:, 3] @ T[:3, :3].T, form.size, strict=True
+    )
+    return [_place(kind, origin, z, size) for kind, origin, z, size in every]
+
+
+def _place(kind: int, origin: Array, z: Array, size: Array) -> Array | None:
+    """Kind, height on the axis and sizes of a surface that is turned about the axis z; None for others."""
+    if kind > TORUS or (kind != SPHERE and math.hypot(*z[:2]) > _PARALLEL):
+        return None
+    if kind != PLANE and math.hypot(*origin[:2]) > _ALIKE:
+        return None
+    if kind == CONE:  # its tip, and which way it opens
+        sense = math.copysign(1.0, z[2])
+        return np.array([kind, origin[2] - sense * size[0] / math.tan(size[1]), sense * size[1], 0.0])
+    return np.array([kind, 0.0 if kind == CYLINDER else origin[2], *size])
+
+
+@lru_cache(maxsize=512)
+def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
+    """The section of a solid about z of a pose (4, 4), in bytes, as far as it is turned about that.
+
+    None where it is not so far as ``radius`` (mm), and where Open CASCADE's sections are not what they should be.
+    """
+    axis = np.frombuffer(pose).reshape(4, 4)
+    solid = moved(from_bytes(brep), inverse(axis))
+    places = places_about(surfaces(brep), axis)
+    reach = _reach(solid, places, radius)
+    if reach <= radius:
+        return None
+    low, high = bounds_of(solid, quick=True)
+    wide = min(reach, math.hypot(*np.maximum(high, -low)[:2]) + _BEYOND)
+    circles = _circles(places)
+    sections = []
+    for angle in _ANGLES:
+        cut = _cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND)
+        loops = tuple(_loop(wire, angle, circles) for wire in explore(cut, "WIRE"))
+        sections.append((loops, area_of(cut)))
+    (loops, area), (others, _) = sections
+    lost = CHORD * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops)
+    is_whole = area > 0.0 and abs(_area(loops) - area) <= lost + _APPROXIMATE * area
+    if not (is_whole and abs(_area(loops) - _area(others)) <= lost):
+        return None
+    return Section(loops, CHORD + TOLERANCE, reach)
+
+
+def _reach(solid: Any, places: list[Array | None], radius: float) -> float:
+    """How far (mm) from z a solid, whose faces have these places, is turned about it, if that is beyond ``radius``."""
+    faces = [*explore(solid, "FACE")]
+    others = [face for face, place in zip(faces, places, strict=True) if place is None]
+    edges: dict[int, list[tuple[Any, Array | None]]] = defaultdict(list)
+    for face, place in zip(faces, places, strict=True):
+        for edge in explore(face, "EDGE"):
+            edges[hash(edge)].append((edge, place))  # of two edges with one hash neither is a seam
+    for beside in edges.values():
+        edge, sides = beside[0][0], [place for _, place in beside]
+        if not (occ.BRep_Tool.Degenerated_s(edge) or _is_about_axis(edge) or _is_seam(sides)):
+            others.append(edge)
+    return min((_from_axis(shape, radius) for shape in others), default=math.inf)
+
+
+def _is_about_axis(edge: Any) -> bool:
+    """Whether an edge is an arc about z."""
+    curve = occ.BRepAdaptor_Curve(edge)
+    if curve.GetType() != occ.GeomAbs_CurveType.GeomAbs_Circle:
+        return False
+    circle = curve.Circle()
+    off, lean = circle.Location().Coord()[:2], circle.Axis().Direction().Coord()[:2]
+    return math.hypot(*off) <= _ALIKE and math.hypot(*lean) <= _PARALLEL
+
+
+def _is_seam(sides: list[Array | None]) -> bool:
+    """Whether both sides of an edge are on one surface turned about z."""
+    places = [place for place in sides if place is not None]
+    return len(places) == len(sides) == 2 and bool(np.abs(places[0] - places[1]).max() <= _ALIKE)
+
+
+def _from_axis(shape: Any, radius: float) -> float:
+    """How far (mm) a shape is from z at least, exactly where its box does not keep ``radius``."""
+    low, high = bounds_of(shape, quick=True)
+    away = math.hypot(*np.maximum(np.maximum(low, -high), 0.0)[:2])
+    if away > radius:
+        return away
+    ends = [occ.gp_Pnt(0.0, 0.0, z) for z in (low[2] - _BEYOND, high[2] + _BEYOND)]
+    axis = occ.BRepBuilderAPI_MakeEdge(*ends).Edge()
+    return float(occ.BRepExtrema_DistShapeShape(axis, shape).Value())
+
+
+def _cut(solid: Any, angle: float, wide: float, low: float, high: float) -> Any:
+    """The faces at an ``angle`` (rad) about z, up to ``wide`` mm from it and between two heights."""
+    across = occ.gp_Dir(math.cos(angle), math.sin(angle), 0.0)
+    frame = occ.gp_Ax3(occ.gp_Pnt(0.0, 0.0, 0.0), occ.gp_Dir(math.sin(angle), -math.cos(angle), 0.0), across)
+    face = occ.BRepBuilderAPI_MakeFace(occ.gp_Pln(frame), -wide, wide, low, high).Face()
+    return occ.BRepAlgoAPI_Common(solid, face).Shape()
+
+
+def _circles(places: list[Array | None]) -> Array:
+    """Centres and radii (k, 3) in sections of the spheres and tori among surfaces."""
+    every = [(0.0, x[1], x[2]) for x in places if x is not None and x[0] == SPHERE]
+    every += [(side * x[2], x[1], x[3]) for x in places if x is not None and x[0] == TORUS for side in (-1.0, 1.0)]
+    return np.array(every).reshape(-1, 3)
+
+
+def _loop(wire: Any, angle: float, circles: Array) -> Array:
+    """Points (n, 2) along a wire of the section at an ``angle``; none if it is not of lines and some of ``circles``.
+
+    Open CASCADE gives curves that are a circle's but for the last digits as splines, 1e-6 mm off.
+    """
+    points, walk = [], occ.BRepTools_WireExplorer(wire)
+    across = np.column_stack([(math.cos(angle), math.sin(angle), 0.0), (0.0, 0.0, 1.0)])
+    while walk.More():
+        edge = walk.Current()
+        curve = occ.BRepAdaptor_Curve(edge)
+        at = np.linspace(curve.FirstParameter(), curve.LastParameter(), _SAMPLES)
+        if edge.Orientation() == occ.TopAbs_Orientation.TopAbs_REVERSED:
+            at = at[::-1]
+        places = np.array([curve.Value(t).Coord() for t in at.tolist()]) @ across
+        points.append(_without_end(places, circles))
+        walk.Next()
+    return np.concatenate(points) if all(map(len, points)) else np.empty((0, 2))
+
+
+def _without_end(places: Array, circles: Array) -> Array:
+    """Points (n, 2), all but the last, on the line or circle through some of it (k, 2); none if it is neither."""
+    if distances_from_segments(places, places[0], places[-1]).max() <= _OFF:
+        return places[:1]
+    centres, radii = circles[:, :2], circles[:, 2]
+    off = np.abs(np.linalg.norm(places - centres[:, None], axis=2) - radii[:, None]).max(axis=1)
+    if not len(off) or off.min() > _OFF:
+        return places[:0]
+    centre, radius = centres[off.argmin()], radii[off.argmin()]
+    turns = np.unwrap(np.arctan2(*(places - centre).T[::-1]))
+    count = chord_count(turns[-1] - turns[0], chord_angle(radius, CHORD))
+    at = np.linspace(turns[0], turns[-1], count + 1)[:-1]
+    return np.asarray(centre + radius * np.column_stack([np.cos(at), np.sin(at)]))
+
+
+def _ways(loop: Array) -> Array:
+    """From each of the points (n, 2) of a loop to the next."""
+    return np.asarray(np.roll(loop, -1, axis=0) - loop)
+
+
+def _area(loops: tuple[Array, ...]) -> float:
+    """What outlines, inner ones the other way round, hold; mm^2."""
+    return abs(sum(0.5 * float((x[:, 0] * (y := _ways(x))[:, 1] - x[:, 1] * y[:, 0]).sum()) for x in loops))
