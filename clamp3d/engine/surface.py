@@ -17,7 +17,7 @@ from clamp3d.geometry.manifolds import as_manifold
 from clamp3d.geometry.mesh import edges_of, is_closed
 from clamp3d.geometry.pose import Array, rotation
 from clamp3d.geometry.shells import shells, winding_numbers
-from clamp3d.geometry.triangles import normals_and_areas
+from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
@@ -106,19 +106,25 @@ class Surface:
 
     @cached_property
     def _tree(self) -> Any:
-        import igl
+        return _nearest_tree(self.vertices, self.faces)
 
-        tree = igl.AABB()
-        tree.init(self.vertices, self.faces)
-        return tree
+    @cached_property
+    def _compact(self) -> tuple[Any, Array, NDArray[np.int64], NDArray[np.int64]]:
+        """Tree, vertices and faces of the same surface without slender triangles, and which each is a piece of."""
+        corners, source = _without_slender(self.vertices[self.faces])
+        if len(source) == len(self.faces):
+            return self._tree, self.vertices, self.faces, source
+        vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(source)).reshape(-1, 3)
+        return _nearest_tree(vertices, faces), vertices, faces, source
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:
         """Distance (k,) of points (k, 3) from the surface, the triangle (k,) that is nearest, and its point (k, 3)."""
         if not len(points):
             return np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3))
         points = np.ascontiguousarray(points, dtype=np.float64)
-        square, face, foot = self._tree.squared_distance(self.vertices, self.faces, points)
-        return np.sqrt(np.atleast_1d(square)), np.atleast_1d(face), np.asarray(foot).reshape(-1, 3)
+        tree, vertices, faces, source = self._compact
+        square, face, foot = tree.squared_distance(vertices, faces, points)
+        return np.sqrt(np.atleast_1d(square)), source[np.atleast_1d(face)], np.asarray(foot).reshape(-1, 3)
 
     def distance(self, points: Array) -> Array:
         """Distance (k,) of points (k, 3) from the surface, never negative."""
@@ -251,12 +257,48 @@ class Surface:
         return np.asarray(corner[self.faces].max(axis=1))
 
 
+_SLENDER, _MOST_PIECES = 300.0, 100_000
+"""Ratio of length to width beyond which triangles are halved, and how many are added for that at most.
+
+libigl's nearest point of a triangle is off by some 1e-16 of its length times the square of that ratio: of one 1000 mm
+long and 0.01 mm wide by 1e-4 mm.
+"""
 _CONTACTS = 100
 """Contacts of each triangle that FCL lists at most, so that its answer does not fill the memory."""
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
 _FAR = 1e-4
 """Distance from the surface, relative to its size, at which single precision tells inside from outside."""
+
+
+def _nearest_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
+    """libigl's tree of boxes of triangles (m, 3)."""
+    import igl
+
+    tree = igl.AABB()
+    tree.init(vertices, faces)
+    return tree
+
+
+def _without_slender(corners: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Triangles (k, 3, 3), the slender ones of (m, 3, 3) halved, and which (k,) each is a piece of.
+
+    Those that are next to nothing stay: their neighbours are as near.
+    """
+    source, hair = np.arange(len(corners)), 1e-9 * float(np.abs(corners).max())
+    most = len(corners) + _MOST_PIECES
+    while True:
+        length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        _, area = normals_and_areas(corners)
+        longest = length.max(axis=1)
+        width = 2.0 * area / np.maximum(longest, 1e-300)
+        rows = np.flatnonzero((longest > _SLENDER * width) & (width > hair))
+        if not 0 < len(rows) <= most - len(corners):
+            return corners, source
+        edge = length[rows].argmax(axis=1)
+        pieces = halves(corners[rows], edge, edge_middles(corners[rows])[np.arange(len(rows)), edge])
+        corners = np.concatenate([np.delete(corners, rows, axis=0), pieces])
+        source = np.concatenate([np.delete(source, rows), np.tile(source[rows], 2)])
 
 
 def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:

@@ -356,3 +356,14 @@ def test_of_a_drawn_groove_a_point_on_its_arc_is_nearest_to_a_mesh():
         found = distance(block, tee, T)
         assert np.hypot(*found.point_a[:2]) == pytest.approx(12.0, abs=1e-7)
         assert found.upper == pytest.approx(np.linalg.norm(found.point_b - found.point_a), abs=1e-7)
+
+
+def test_slender_triangles_say_no_more_than_is_true():
+    """A bar of 1157 flats 1150 mm long, 0.0001 mm in a plate: its triangles are 80 000 times as long as wide."""
+    bar = manifold3d.Manifold.cylinder(1150.0, 2.7119, 2.7119, 1157).translate((0.0, 0.0, -575.0))
+    bar = manifold_shape(bar, "off")
+    plate = mesh_shape(trimesh.creation.box((40.0, 10.0, 1300.0)), "off")
+    lowest = float(bar.mesh.vertices[:, 1].min())
+    for aside in (0.0, 0.003, 0.01):
+        overlap = distance(plate, bar, translation(aside, 5.0 - 1e-4 - lowest, 0.0))
+        assert overlap.lower - 1e-7 <= -1e-4 <= overlap.upper + 1e-7

@@ -85,11 +85,12 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
     monkeypatch.setattr(cad_pair, "meshes_distance", meshes)
+    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: Distance(method="sections"))
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    begin, both = ["probe", "distance"], (0.1, 0.0018)
+    begin, both = ["sections", "probe", "distance"], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for first, second, triangles, end in (
@@ -116,6 +117,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
         raise SolverError("no answer in 20 s")
 
     monkeypatch.setattr(cad_pair, "meshes_distance", fails)
+    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
@@ -136,6 +138,7 @@ def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(monkey
     class Formed(SimpleNamespace):
         quick_bodies = property(made.append)
 
+    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", lambda *_, **__: Distance(-5.0, method="common part"))
