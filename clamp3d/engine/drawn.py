@@ -23,7 +23,7 @@ def bodies_of(solid: Solid) -> tuple[ClosedForm, ...] | None:
     """Bodies whose union is the solid; None if an outline is of a kind that has no closed form here.
 
     An outline is taken apart at the chords of its arcs: what remains must be convex. Each convex arc adds the segment
-    between it and its chord, each concave one is a groove.
+    between it and its chord, each concave one is a groove of what remains, and may not reach into such a segment.
     """
     bodies: list[ClosedForm] = []
     for body in solid.bodies:
@@ -52,6 +52,8 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
     grooves = []
     for arc in body.profile.arcs:
         if arc.sweep < 0.0:
+            if any(_passes_chord(arc, other) for other in body.profile.arcs if other.sweep > 0.0):
+                return None
             middle = 0.5 * (arc.start_angle + arc.end_angle)
             T = _pose(body, arc.centre, middle)
             grooves.append(Bore(arc.radius, 0.5 * abs(arc.sweep), body.length, T))
@@ -62,6 +64,14 @@ def _pieces(body: Extrusion) -> list[tuple[tuple[Convex, ...], list[Bore]]] | No
     elif grooves:
         return None
     return pieces
+
+
+def _passes_chord(concave: Arc, convex: Arc) -> bool:
+    """Whether a concave arc takes something away between a convex one and its chord, as the inside of a clip does."""
+    (x0, y0), (x1, y1) = convex.start, convex.end
+    out = y1 - y0, x0 - x1
+    size = abs(x0) + abs(y0) + concave.radius + math.hypot(*concave.centre)
+    return concave.support(*out) > out[0] * x0 + out[1] * y0 + STRAIGHT * size * math.hypot(*out)
 
 
 def _circle(profile: Profile) -> Arc | None:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
 _THROUGH = 1.0  # mm by which a hole's tool stands out at both ends, so that no two faces coincide
+_SLIVER = 1e-9
+"""Width, relative to an outline's extent, of what rounding may leave between two lines that coincide."""
 
 
 def mesh(part: Solid, mesh_error: float = 0.01) -> trimesh.Trimesh:
@@ -149,19 +151,22 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
 
 def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
     """The outline as polygons: one, or where tangents cross it the pieces that are left, or that are to be joined."""
-    from shapely import Polygon, union_all
+    from shapely import Polygon, make_valid, union_all
 
     whole = Polygon(profile.polygon(mesh_error, side))
     if side == "chords" or whole.is_valid:
         return [whole]
-    # Tangents that cross a neighbour: the lens between each arc's chords and tangents is added or taken away by itself.
+    # Tangents cross a neighbour, or chords do in a thin wall: there the outline of chords is wrong only in the lenses
+    # between chords and tangents. These are added or taken away by themselves, of all arcs.
+    chords = make_valid(Polygon(profile.polygon(mesh_error)))
     lenses = []
     for arc in profile.arcs:
-        if (arc.sweep > 0.0) == (side == "outer"):
-            chords = [*arc.chords(mesh_error, arc.start), arc.end]
-            lenses.append(Polygon([*chords, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
-    chords = Polygon(profile.polygon(mesh_error))
-    # Their union in the plane would have cracks along the chords: `_extrude` joins the prisms.
-    polygons = [chords, *lenses] if side == "outer" else [chords.difference(union_all(lenses))]
+        corners = [*arc.chords(mesh_error, arc.start), arc.end]
+        lenses.append(Polygon([*corners, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
+    if side == "outer":  # their union in the plane would have cracks along the chords: `_extrude` joins the prisms
+        polygons = [chords, *lenses]
+    else:  # taken away a little wider, else slivers are left along chords of concave arcs, which lie outside
+        width = _SLIVER * float(np.ptp(profile.bounds, axis=0).max())
+        polygons = [chords.difference(union_all(lenses).buffer(width, join_style="mitre"))]
     parts = [part for some in polygons for part in getattr(some, "geoms", [some])]
     return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]

@@ -122,6 +122,10 @@ class Segment:
     start: Point
     end: Point
 
+    def support(self, da: float, db: float) -> float:
+        """As `Profile.support`, of this edge alone."""
+        return max(da * a + db * b for a, b in (self.start, self.end))
+
 
 @dataclass(frozen=True, slots=True)
 class Arc:
@@ -161,6 +165,14 @@ class Arc:
     def at(self, angle: float) -> Point:
         """Point (a, b) in mm at ``angle`` rad."""
         return self.centre[0] + self.radius * math.cos(angle), self.centre[1] + self.radius * math.sin(angle)
+
+    def support(self, da: float, db: float) -> float:
+        """As `Profile.support`, of this edge alone."""
+        low, high = sorted((self.start_angle, self.end_angle))
+        direction = math.atan2(db, da)
+        if direction + 2.0 * math.pi * math.ceil((low - direction) / (2.0 * math.pi)) <= high:
+            return da * self.centre[0] + db * self.centre[1] + self.radius * math.hypot(da, db)
+        return max(da * a + db * b for a, b in (self.start, self.end))
 
     def chord_count(self, mesh_error: float) -> int:
         """Number of equal chords that stay within ``mesh_error`` mm of the arc.
@@ -342,15 +354,7 @@ class Profile:
         float
             The reach in mm times the direction's length.
         """
-        reach, direction = -math.inf, math.atan2(db, da)
-        for edge in self.edges:
-            reach = max(reach, *(da * a + db * b for a, b in (edge.start, edge.end)))
-            if isinstance(edge, Arc):
-                low, high = sorted((edge.start_angle, edge.end_angle))
-                turns = math.ceil((low - direction) / (2.0 * math.pi))
-                if direction + 2.0 * math.pi * turns <= high:
-                    reach = max(reach, da * edge.centre[0] + db * edge.centre[1] + edge.radius * math.hypot(da, db))
-        return reach
+        return max(edge.support(da, db) for edge in self.edges)
 
     def polygon(self, mesh_error: float, side: Side = "chords") -> Array:
         """The outline with its arcs as equal chords, whose ends lie on the arc, or as tangents.

@@ -9,14 +9,17 @@ import pytest
 import trimesh
 
 from clamp3d import distance
+from clamp3d.geometry.profile import Arc, Profile
 from clamp3d.kernel import rotation, translation
-from clamp3d.shapes import Hole, SweptArc, box, cylinder, groove_block
+from clamp3d.shapes import Hole, SweptArc, box, cylinder, extrusion, groove_block, sphere
 from tests.kinds import mesh_shape, row_of
 
 HALF = math.radians(60.0)
 BLOCK = groove_block(SweptArc(7.0, HALF, 50.0), 40.0, 20.0)  # its face is at y = -3.5
 TUBE, PIN = cylinder(9.0, 40.0, bore=5.1), cylinder(5.0, 60.0)
 PLATE = box((40.0, 30.0, 6.0), holes=[Hole(4.0, (3.0, 2.0))])
+CLIP = extrusion(Profile.of(Arc((0.0, 0.0), 10.0, -1.2, 1.2), Arc((0.0, 0.0), 8.0, 1.2, -1.2)), 4.0)
+THIN_CLIP = extrusion(Profile.of(Arc((0, 0), 12.0, -2.2, 2.2), Arc((0, 0), 11.6, 2.2, -2.2)), 5.0)
 WIRE = cylinder(6.935, 80.0)
 TILT = math.radians(0.1)
 SQRT2 = math.sqrt(2.0)
@@ -41,6 +44,8 @@ APART = {
         math.cos(0.002) * (5.05 - 10 * math.tan(0.002)) - 5,
     ),
     "a pin in a hole": (PLATE, cylinder(3.75, 20), translation(3, 2, 1), 0.25),
+    "a pin inside a clip": (CLIP, cylinder(1.5, 10), translation(6, 0, 0), 0.5),
+    "a ball inside a thin clip": (THIN_CLIP, sphere(1.0), np.eye(4), 10.6),
     "a wire in its groove": (BLOCK, WIRE, np.eye(4), 0.065),
     "a wire low in its groove": (BLOCK, WIRE, translation(0, -0.0649, 0), 1e-4),
     "a wire askew in its groove": (
@@ -49,7 +54,7 @@ APART = {
     "a square bar in a groove": (BLOCK, box((8, 8, 60)), np.eye(4), 7 - 4 * SQRT2),
     "a box over a groove": (BLOCK, box((30, 10, 10)), translation(0, 2.25, 0), 0.75),
 }  # fmt: skip
-LOOSE_APART = {"a square bar in a groove": 1e-3}
+LOOSE_APART = {"a square bar in a groove": 1e-3, "a pin inside a clip": 1e-3, "a ball inside a thin clip": 2e-3}
 """Pairs that meshes measure, to their chord error."""
 OVERLAPPING = {
     "boxes by 0.01 um": (box((10, 10, 10)), box((4, 6, 8)), translation(1, 1, 9 - 1e-5), 1e-5),
