@@ -28,7 +28,8 @@ STIFF = 4.0
 STEP = 0.2 / STIFF
 ROUND, REST = 200, 0.01
 """What moves by less than so many mm in a round of so many steps is at rest: normals of points tremble a little."""
-POINTS = 0.02
+POINTS = 0.2
+"""Spacing (mm) of an outline's points: the nearest is 1e-4 mm farther than the arc, and springs give way by 0.1 mm."""
 
 
 class Springs:

@@ -105,12 +105,12 @@ def test_a_shared_volume_holds_where_open_cascade_integrates_badly():
     squeeze = occ.gp_GTrsf()
     squeeze.SetValue(1, 1, 1.7)
     squeeze.SetValue(2, 2, 0.6)
-    tube = cut(rod(10.0, 0.0, 20.0), rod(7.0, -5.0, 35.0, 1.0))
+    tube = cut(rod(10.0, 0.0, 6.0), rod(7.0, -5.0, 11.0, 1.0))
     tube = first_solid(occ.BRepBuilderAPI_GTransform(tube, squeeze, True).Shape())
     scene = Scene().add("block", BrepSolid.of(block((-50, -50, -50), (50, 50, 50)), "block"))
     (row,) = check(scene.add("tube", BrepSolid.of(tube, "tube"))).pairs
     low, high = row.where.volume
-    assert low <= 1.7 * 0.6 * np.pi * (10.0**2 - 7.0**2) * 20.0 <= high <= 1.02 * low
+    assert low <= 1.7 * 0.6 * np.pi * (10.0**2 - 7.0**2) * 6.0 <= high <= 1.02 * low
 
 
 @pytest.mark.parametrize("gap", [-8.0, -0.5])
@@ -464,8 +464,7 @@ def test_near_the_pole_of_a_sphere_a_point_is_as_deep_as_the_formula_says(spline
     assert cad_process.depths(brep, points) == pytest.approx(away, abs=1e-9)
 
 
-@pytest.mark.parametrize("order", [1, -1])
-def test_a_dome_is_as_far_from_a_plate_as_its_centre_less_its_radius(order):
+def test_a_dome_is_as_far_from_a_plate_as_its_centre_less_its_radius():
     """Its pole is nearly the nearest point: Open CASCADE's distance is up to 0.02 mm too large."""
     rng = np.random.default_rng(2)
     fused = occ.ShapeUpgrade_UnifySameDomain(occ.BRepAlgoAPI_Fuse(rod(8.0, 0.0, 16.0), ball(8.0)).Shape())
@@ -475,10 +474,10 @@ def test_a_dome_is_as_far_from_a_plate_as_its_centre_less_its_radius(order):
     for tilt in 10.0 ** rng.uniform(-5, -1, 25):
         gap, axis = float(10.0 ** rng.uniform(-4, -1)), [*rng.normal(size=2), 0.0]
         plate = block((-30, -30, -20), (30, 30, -8.0 - gap))
-        a, b = models_of(plate, moved(dome, turn(axis, tilt)))[::order]
-        distance = exact_distance(a, b, np.eye(4))
-        assert distance.lower <= gap <= distance.upper
-        assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
+        for a, b in itertools.permutations(models_of(plate, moved(dome, turn(axis, tilt)))):
+            distance = exact_distance(a, b, np.eye(4))
+            assert distance.lower <= gap <= distance.upper
+            assert distance.upper - distance.lower == pytest.approx(2e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize("splines", [False, True])

@@ -2,20 +2,19 @@
 
 import json
 import re
-import time
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from clamp3d.bench.stress.outcome import judge
-from clamp3d.bench.stress.poses.cases import Cases
 from clamp3d.bench.stress.poses.family import POSES
 from clamp3d.bench.stress.poses.flat import FLATS
 from clamp3d.bench.stress.poses.truth import EXTENDED_ERROR, EXTENDED_WORKS, truth, truth_50_digits
 from clamp3d.bench.stress.run import KINDS, run_family, run_stress
-from clamp3d.bench.stress.worker import Answers, Measured, run_isolated
+from clamp3d.bench.stress.worker import Answers, run_isolated
 from clamp3d.cli import group
+from tests.bench.stress.fatal import Fatal
 from tests.refusals import refusals
 
 CASES = 250 if EXTENDED_WORKS else 50  # the campaigns of docs/methods.md have 100 000
@@ -72,28 +71,9 @@ def test_a_wrong_method_is_seen():
     assert outcome.wrong == 10
 
 
-class _Fatal:
-    measures = "depth"
-
-    def measure(self, cases: Cases) -> Measured:
-        import os
-        import signal
-
-        if (np.abs(cases.gap) > 0).any() and np.round(cases.gap[0], 12) == np.round(_BAD[0], 12):
-            os.kill(os.getpid(), signal.SIGSEGV)
-        if len(cases) > 1:
-            raise ValueError("one by one")
-        if np.round(cases.gap[0], 12) == np.round(_BAD[1], 12):
-            time.sleep(60)
-        return Measured(cases.gap, cases.gap * np.nan, np.zeros(len(cases), bool))
-
-
-_BAD = POSES["tangency"].cases(4, 0).gap[[1, 3]]
-
-
 def test_a_method_that_ends_the_interpreter_is_counted():
     cases = POSES["tangency"].cases(4, 0)
-    answers = run_isolated(_Fatal, cases, time_limit=60.0, case_limit=1.0)
+    answers = run_isolated(Fatal(*cases.gap[[1, 3]]), cases, time_limit=60.0, case_limit=1.0)
     assert answers.crashed == [1]
     assert answers.timeouts == [3]
     assert np.isfinite(answers.distance).sum() == 2
