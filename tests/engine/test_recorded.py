@@ -1,0 +1,122 @@
+"""Answers of the engine as they were once recorded, with the work that they took: a change of any number is seen.
+
+What they were judged by then is in the other files here. ``python -m tests.engine.test_recorded`` records them again.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from clamp3d import Motion, Scene, check, distance, first_contact, min_clearance, shapes
+from clamp3d.engine.model import ModelCache
+from clamp3d.engine.poses import check_poses
+from clamp3d.kernel import rotation, translation
+from tests.kinds import DRAWN, faceted_shape, mesh_shape
+from tests.recorded import differences, recorded
+
+FILE = Path(__file__).with_name("data") / "answers.json"
+SIZE = np.array((1.0, 0.8, 1.3))
+BODIES = [
+    *DRAWN,
+    shapes.extrusion([(-9, -9), (9, -9), (9, -3), (-3, -3), (-3, 9), (-9, 9)], 14.0, name="angle"),
+    shapes.sphere(6.0),
+    faceted_shape(shapes.cylinder(5.0, 24.0, name="scanned rod"), 0.02, "round"),
+    faceted_shape(shapes.cylinder(8.0, 12.0, bore=4.0, name="scanned tube"), 0.05, "round"),
+    faceted_shape(DRAWN[0], 0.03, "round"),
+    mesh_shape(trimesh.creation.box((16.0, 12.0, 20.0)), error=0.02, name="cast box"),
+    mesh_shape(trimesh.creation.icosphere(subdivisions=2, radius=8.0).apply_scale(SIZE), name="egg"),
+    mesh_shape(trimesh.creation.torus(9.0, 3.0, major_sections=20, minor_sections=10), name="torus"),
+]
+GAPS = (-12.0, -8.0, -5.0, -3.0)
+SLOW = {2, 4, 9, 12, 14, 15, 16, 20, 28, 33, 36, 40, 49, 52, 53, 55, 56, 57}
+"""Numbers of pairs that take longer than all others together."""
+
+
+def random_pose(rng, gap, a, b):
+    """A pose of b at which the boxes of two bodies overlap by ``-gap`` mm along some direction."""
+    R = rotation(rng.normal(size=3), rng.choice((0.0, 1.0, 2.0, 3.0)))
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    boxes = [ModelCache().model(shape).bounds for shape in (a, b)]
+    reach = 0.5 * sum(np.ptp(box, axis=0) for box in boxes) @ np.abs(way)
+    return translation(*(boxes[0].mean(axis=0) + (reach + gap) * way)) @ R
+
+
+def two_bodies(number):
+    """Two of `BODIES`, the second at a pose that no other number gives."""
+    rng = np.random.default_rng(number)
+    a, b = (BODIES[k] for k in np.random.default_rng(1000 + number).choice(len(BODIES), 2))
+    return a, b, random_pose(rng, GAPS[number % 4], a, b)
+
+
+def checked(scene, **options):
+    """The rows of a check, and what it built and asked."""
+    result = check(scene, **options)
+    work = {key: getattr(result.work, key) for key in ("meshes", "triangles", "hulls", "fits", "queries", "decided")}
+    return {"rows": [row.to_dict() for row in result.rows], "asked": work}
+
+
+def pair(a, b, T):
+    """What is said of two bodies: by a check, by one that measures all, and by the distance alone."""
+    scene = Scene(clearance=0.5).add("a", a).add("b", b, T)
+    measured = {"distances": checked(scene, distances=True), "distance": distance(a, b, T).to_dict()}
+    return {"bodies": f"{a.name}, {b.name}", **checked(scene), **measured}
+
+
+def pairs(numbers):
+    return [pair(*two_bodies(number)) for number in numbers if number not in SLOW]
+
+
+def motions(numbers):
+    """The least distances and first contacts of bodies that go past each other, and turn."""
+    answers = []
+    for number in numbers:
+        a, b, T = two_bodies(number)
+        rng = np.random.default_rng(number)
+        way, turn = 8.0 * rng.normal(size=3), Motion.screw(rng.normal(size=3), 1.2, travel=6.0, parts="b", name="turn")
+        motion = (Motion.translate(way, parts="b"), turn, replace(turn, travel=way))[number % 3]
+        scene = Scene(clearance=0.5).add("a", a).add("b", b, T @ translation(*(-0.5 * way)))
+        answers.append({"bodies": f"{a.name}, {b.name}", **checked(scene.with_motion(motion))})
+        for ask in (first_contact, min_clearance):
+            answer = ask(a, b, motion, scene.parts[1].T_world)
+            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution", "evaluations")})
+            answers.append(answer.distance.to_dict())
+    return answers
+
+
+def poses(numbers):
+    """A body at many poses against another."""
+    answers = []
+    for number in numbers:
+        a, b, _ = two_bodies(number)
+        rng = np.random.default_rng(number)
+        T = [random_pose(rng, rng.uniform(-12.0, -4.0), a, b) for _ in range(12)]
+        told = check_poses(Scene(clearance=1.0).add("a", a).add("b", b), "b", T)
+        names = "row", "column", "least", "most", "kind", "worst"
+        answers.append({"bodies": f"{a.name}, {b.name}", **{name: getattr(told, name).tolist() for name in names}})
+    return answers
+
+
+RECORDS = {
+    **{f"pairs from {k}": (pairs, range(k, k + 10)) for k in range(0, 60, 10)},
+    "motions": (motions, (0, 3, 5, 6, 8)),
+    "poses": (poses, range(12)),
+}
+
+
+def answer(name):
+    ask, numbers = RECORDS[name]
+    return recorded(ask(numbers))
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_answers_are_those_that_were_recorded(name):
+    assert differences(answer(name), json.loads(FILE.read_text(encoding="utf-8"))[name]) == []
+
+
+if __name__ == "__main__":
+    FILE.write_text(json.dumps({name: answer(name) for name in RECORDS}, indent=0) + "\n", encoding="utf-8")
