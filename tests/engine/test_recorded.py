@@ -101,10 +101,39 @@ def poses(numbers):
     return answers
 
 
+def solids(numbers):
+    """What is said of two solids from CAD: beside each other, a pin in its hole, and overlapping."""
+    pytest.importorskip("OCP")
+    from clamp3d.files.solid import BrepSolid
+    from tests import cad
+
+    plate = cad.cut(cad.block((-12, -9, -3), (12, 9, 3)), cad.rod(4.0, -4, 4, 1.0))
+    made = (
+        plate,
+        cad.rod(3.9, -8, 8),
+        cad.ring(9.0, 2.0),
+        cad.cone(3.0, 1.0, -5, 6),
+        cad.ball(5.0, 1.0),
+        cad.rod(4.03, -2, 9),
+    )
+    shapes = [BrepSolid.of(cad.first_solid(shape), f"solid {k}") for k, shape in enumerate(made)]
+    places = {
+        (0, 1): translation(1.05, 0.0, 2.0),
+        (0, 2): translation(9.0, 4.0, 4.3) @ rotation((1.0, 2.0, 0.5), 0.4),
+        (1, 3): translation(5.0, 1.0, 1.0) @ rotation((1.0, 1.0, 0.0), 0.7),
+        (2, 4): translation(1.0, 11.0, 5.0),
+        (3, 4): translation(4.5, 3.0, 5.0),
+        (0, 5): translation(1.0, 0.0, 0.0),
+    }
+    chosen = [list(places)[number] for number in numbers]
+    return [pair(shapes[i], shapes[j], places[i, j]) for i, j in chosen]
+
+
 RECORDS = {
     **{f"pairs from {k}": (pairs, range(k, k + 10)) for k in range(0, 60, 10)},
     "motions": (motions, (0, 3, 5, 6, 8)),
     "poses": (poses, range(12)),
+    "solids": (solids, range(6)),
 }
 
 
