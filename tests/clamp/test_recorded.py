@@ -30,6 +30,8 @@ COMMANDS = {
     "stepped": "run --jumper LJ-240 --solver stepped --tilt-step-deg 2 --step 0.5",
     "not-closed": "run --line 70",
     "other-jumper": "run --line LJ-500 --jumper LJ-400",
+    "thin-wires": "run OTHER --line 24 --jumper 12",
+    "other-order": "run OTHER --sequence P1->P7->P2->P3|P4->P5 --no-equilibria",
     "jumper-sweep": "sweep OTHER --wire p7 --steps 8 --seat-tolerance 0.3",
     "line-sweep": "sweep --line LJ-500 --steps 4 --yaw-deg 2",
     "tolerance": "tolerance --n 4 --seed 3",

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from clamp3d import Motion, Scene, check, distance, first_contact, min_clearance, shapes
+from clamp3d import Motion, Scene, check, distance, distances, first_contact, min_clearance, shapes
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.poses import check_poses
-from clamp3d.kernel import rotation, translation
+from clamp3d.kernel import Capsule, Cylinder, SweptArc, rotation, translation
 from tests.kinds import DRAWN, faceted_shape, mesh_shape
 from tests.recorded import differences, recorded
 
@@ -88,6 +88,60 @@ def motions(numbers):
     return answers
 
 
+def opened(error):
+    """The walls of a box without a lid, off by ``error`` mm."""
+    walls = trimesh.creation.box((14.0, 10.0, 12.0))
+    up = walls.face_normals[:, 2] > 0.5
+    return mesh_shape(trimesh.Trimesh(walls.vertices, walls.faces[~up]), error=error, name="open box")
+
+
+def surfaces(numbers):
+    """What is said of meshes that are open, or cross themselves, apart from others, around and across them."""
+    crossed = mesh_shape(trimesh.creation.torus(3.0, 4.0, major_sections=16, minor_sections=12), name="crossed")
+    turned = rotation((1.0, 2.0, 0.5), 0.4)
+    places = [
+        (opened(0.02), shapes.cylinder(2.0, 30.0), translation(13.0, 1.0, 4.0) @ turned),
+        (opened(0.02), shapes.cylinder(2.0, 4.0), translation(1.0, 0.5, 1.0) @ turned),
+        (crossed, BODIES[3], translation(3.0, 2.0, 25.0) @ turned),
+        (crossed, BODIES[9], translation(5.0, 4.0, 6.0) @ turned),
+        (opened(0.0), opened(0.01), translation(6.0, 5.0, 4.0) @ turned),
+        (crossed, crossed, translation(1.0, 0.5, 14.0) @ turned),
+    ]
+    return [pair(*places[number]) for number in numbers]
+
+
+def grooves(numbers):
+    """First contacts and least distances of a wire in a bare groove, whose motion slides, turns and tilts it."""
+    answers = []
+    for number in numbers:
+        rng = np.random.default_rng(number)
+        wire = (Cylinder(5.5, 40.0), Capsule(6.0, 60.0))[number % 2]
+        start = translation(*(0.3 * rng.normal(size=2)), 5.0) @ rotation(rng.normal(size=3), 0.02)
+        axis, point = rng.normal(size=3), 20.0 * rng.normal(size=3)
+        motion = replace(Motion.screw(axis, 0.05 * (number - 1), point=point), travel=np.array((0.4, -0.9, 8.0)))
+        for ask in (first_contact, min_clearance):
+            answer = ask(SweptArc(7.0, 1.2, 50.0), wire, motion, start)
+            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution", "evaluations")})
+            answers.append(answer.distance.to_dict())
+    return answers
+
+
+def bores(numbers):
+    """Distances of a body at many poses in a groove or a hole, measured together."""
+    tube = shapes.cylinder(8.0, 12.0, bore=4.0)
+    bodies = (DRAWN[0], 6.5), (tube, 3.5), (DRAWN[6], 3.8), (DRAWN[2], 6.6)
+    answers = []
+    for number in numbers:
+        (holder, radius), rng = bodies[number % 4], np.random.default_rng(number)
+        rod = shapes.sphere(radius) if number == 5 else shapes.cylinder(radius, 30.0)
+        place = translation(3.0, 2.0, 0.0) if holder is DRAWN[6] else np.eye(4)
+        T = [place @ translation(*(0.3 * rng.normal(size=3))) @ rotation(rng.normal(size=3), 0.02) for _ in range(9)]
+        pair = (rod, holder, np.linalg.inv(T)) if number > 5 else (holder, rod, np.array(T))
+        told = distances(*pair)
+        answers.append({name: getattr(told, name).tolist() for name in ("lower", "upper")} | {"by": list(told.method)})
+    return answers
+
+
 def poses(numbers):
     """A body at many poses against another."""
     answers = []
@@ -102,7 +156,7 @@ def poses(numbers):
 
 
 def solids(numbers):
-    """What is said of two solids from CAD: beside each other, a pin in its hole, and overlapping."""
+    """What is said of two solids from CAD: of a pin in its hole, and of overlaps."""
     pytest.importorskip("OCP")
     from clamp3d.files.solid import BrepSolid
     from tests import cad
@@ -114,7 +168,6 @@ def solids(numbers):
         cad.ring(9.0, 2.0),
         cad.cone(3.0, 1.0, -5, 6),
         cad.ball(5.0, 1.0),
-        cad.rod(4.03, -2, 9),
     )
     shapes = [BrepSolid.of(cad.first_solid(shape), f"solid {k}") for k, shape in enumerate(made)]
     places = {
@@ -123,7 +176,6 @@ def solids(numbers):
         (1, 3): translation(5.0, 1.0, 1.0) @ rotation((1.0, 1.0, 0.0), 0.7),
         (2, 4): translation(1.0, 11.0, 5.0),
         (3, 4): translation(4.5, 3.0, 5.0),
-        (0, 5): translation(1.0, 0.0, 0.0),
     }
     chosen = [list(places)[number] for number in numbers]
     return [pair(shapes[i], shapes[j], places[i, j]) for i, j in chosen]
@@ -131,9 +183,12 @@ def solids(numbers):
 
 RECORDS = {
     **{f"pairs from {k}": (pairs, range(k, k + 10)) for k in range(0, 60, 10)},
-    "motions": (motions, (0, 3, 5, 6, 8)),
+    "motions": (motions, (0, 5, 6, 8)),
     "poses": (poses, range(12)),
-    "solids": (solids, range(6)),
+    "solids": (solids, range(5)),
+    "surfaces": (surfaces, range(6)),
+    "grooves": (grooves, range(5)),
+    "bores": (bores, (0, 1, 3, 4, 5, 7)),
 }
 
 

@@ -55,7 +55,7 @@ PARTS = {
     "torn splint": torn,
     "stepped bar": stepped_bar,
     "nine sides": lambda: prism([(6 * np.cos(k * np.pi / 4.5), 6 * np.sin(k * np.pi / 4.5)) for k in range(9)], 14.0),
-    "scanned groove": lambda: trimesh.Trimesh(*scan(2.0, 0.03, 1), process=False),
+    "scanned groove": lambda: trimesh.Trimesh(*scan(2.5, 0.03, 1), process=False),
     "scanned bar": lambda: scattered(shell(8.0, np.pi, 30.0, 41, 16), 0.01),
     "scanned arc": lambda: scattered(shell(12.0, 1.1, 30.0, 25, 18), 0.02),
 }
