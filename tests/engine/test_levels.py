@@ -415,4 +415,5 @@ def test_bounds_at_many_poses_hold_for_each_of_them(holder, radius, length, seed
         one = distance(holder, wire, pose, cache=MODELS)
         assert many.lower[k] <= max(one.upper, 0.0) + 1e-9
         assert one.lower <= many.upper[k] + 1e-9
+        assert not 1e-9 < many.upper[k] - many.lower[k] < np.inf  # where both are known, but for rounding
     assert_distance(distance(holder, wire, T[0], cache=MODELS), holder, wire, T[0], cells=4000)

@@ -141,6 +141,15 @@ def test_nothing_is_made_up(mesh):
     assert "no groove: no concave circular arc found" in result.notes
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("gap", "count"), [(4.0, 1), (6.0, 2)])
+def test_bars_in_line_are_one_up_to_a_quarter_of_the_shorter_one_apart(gap, count, side):
+    bars = [trimesh.creation.cylinder(5.0, length, sections=32) for length in (20.0, 30.0)]
+    bars[1].apply_translation((0.0, 0.0, side * (25.0 + gap)))
+    lengths = [bar.length for bar in fitted(trimesh.util.concatenate(bars)).cylinders]
+    assert lengths == pytest.approx([50.0 + gap] if count == 1 else [30.0, 20.0], abs=1e-4)
+
+
 @pytest.mark.parametrize("flank_deg", [20.0, 60.0])
 def test_v_and_trapezoid_grooves_are_not_arcs(flank_deg):
     s = 5.0 * np.tan(np.radians(flank_deg))
