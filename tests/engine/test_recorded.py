@@ -136,9 +136,9 @@ def bores(numbers):
         rod = shapes.sphere(radius) if number == 5 else shapes.cylinder(radius, 30.0)
         place = translation(3.0, 2.0, 0.0) if holder is DRAWN[6] else np.eye(4)
         T = [place @ translation(*(0.3 * rng.normal(size=3))) @ rotation(rng.normal(size=3), 0.02) for _ in range(9)]
-        pair = (rod, holder, np.linalg.inv(T)) if number > 5 else (holder, rod, np.array(T))
-        told = distances(*pair)
-        answers.append({name: getattr(told, name).tolist() for name in ("lower", "upper")} | {"by": list(told.method)})
+        placed = (rod, holder, np.linalg.inv(T)) if number > 5 else (holder, rod, np.array(T))
+        many = distances(*placed)
+        answers.append({name: getattr(many, name).tolist() for name in ("lower", "upper")} | {"by": list(many.method)})
     return answers
 
 
@@ -149,9 +149,9 @@ def poses(numbers):
         a, b, _ = two_bodies(number)
         rng = np.random.default_rng(number)
         T = [random_pose(rng, rng.uniform(-12.0, -4.0), a, b) for _ in range(12)]
-        told = check_poses(Scene(clearance=1.0).add("a", a).add("b", b), "b", T)
+        verdicts = check_poses(Scene(clearance=1.0).add("a", a).add("b", b), "b", T)
         names = "row", "column", "least", "most", "kind", "worst"
-        answers.append({"bodies": f"{a.name}, {b.name}", **{name: getattr(told, name).tolist() for name in names}})
+        answers.append({"bodies": f"{a.name}, {b.name}", **{name: getattr(verdicts, name).tolist() for name in names}})
     return answers
 
 
