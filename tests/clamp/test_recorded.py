@@ -4,7 +4,6 @@ What they were judged by then is in the other files here. ``python -m tests.clam
 """
 
 import json
-import math
 import tempfile
 from importlib import resources
 from pathlib import Path
@@ -12,15 +11,9 @@ from pathlib import Path
 import pytest
 
 from tests.command import call
+from tests.recorded import differences, recorded
 
 DATA = Path(__file__).with_name("data")
-TOLERANCE = 2e-6
-"""Processors may differ by that, and the records are rounded to six digits."""
-NOT_RECORDED = {"clamp3d", "work", "weakest", "residuals", "error_bound_mm", "unbalanced", "states_beyond", "depth_mm"}
-"""Version, counts of work, and what is mostly rounding or one of many equal answers."""
-PLACED = {"level", "travel_mm", "measured"}
-"""Keys of a contact, an event, and a difference from the matrix: their places are unique only where they say so."""
-PLACES = {"point", "point_a", "point_b", "normal", "direction"}
 OTHER_CLAMP = {
     'name = "reference"': 'name = "other"',
     "thickness = 27.7260": "thickness = 29.1",
@@ -37,6 +30,8 @@ COMMANDS = {
     "stepped": "run --jumper LJ-240 --solver stepped --tilt-step-deg 2 --step 0.5",
     "not-closed": "run --line 70",
     "other-jumper": "run --line LJ-500 --jumper LJ-400",
+    "thin-wires": "run OTHER --line 24 --jumper 12",
+    "other-order": "run OTHER --sequence P1->P7->P2->P3|P4->P5 --no-equilibria",
     "jumper-sweep": "sweep OTHER --wire p7 --steps 8 --seat-tolerance 0.3",
     "line-sweep": "sweep --line LJ-500 --steps 4 --yaw-deg 2",
     "tolerance": "tolerance --n 4 --seed 3",
@@ -55,28 +50,6 @@ def answer(command, folder):
     code, out, err = call(*arguments, "--quiet", "--json", "-")
     assert out.startswith("{"), err
     return {"exit code": code} | recorded(json.loads(out))
-
-
-def recorded(value):
-    """A value of JSON without what is `NOT_RECORDED`; of nearest points that are not unique no place."""
-    if isinstance(value, list):
-        return [recorded(item) for item in value]
-    if not isinstance(value, dict):
-        return round(value, 6) if isinstance(value, float) else value
-    is_open = bool(PLACED & set(value)) and value.get("unique") is not True
-    places = PLACES if is_open else set()
-    return {key: recorded(item) for key, item in value.items() if key not in NOT_RECORDED | places}
-
-
-def differences(new, old, path=""):
-    """Where two values of JSON differ."""
-    if isinstance(new, dict) and isinstance(old, dict) and list(new) == list(old):
-        return [line for key in new for line in differences(new[key], old[key], f"{path}/{key}")]
-    if isinstance(new, list) and isinstance(old, list) and len(new) == len(old):
-        return [line for k in range(len(new)) for line in differences(new[k], old[k], f"{path}/{k}")]
-    if isinstance(new, float) and isinstance(old, int | float) and math.isclose(new, old, abs_tol=TOLERANCE):
-        return []
-    return [] if new == old else [f"{path}: {new!r}, recorded {old!r}"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from clamp3d import Scene, Verdict, check, distance, shapes
 from clamp3d.engine.convex import Rod, convex_distance
 from clamp3d.engine.convex_depth import convex_depth
-from clamp3d.engine.hull import Hull, hull, hull_error
+from clamp3d.engine.hull import Hull, hull, hull_error, prism
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
 from clamp3d.testing import directions
 from tests.kinds import TURNED, manifold_shape
@@ -153,6 +153,19 @@ def test_what_is_left_before_a_plane():
         assert (left.vertices @ plane[:3] + plane[3]).min() >= -1e-9
     assert CUBE.clipped(np.array([0.0, 0.0, 1.0, 3.0])) is CUBE
     assert CUBE.clipped(np.array([0.0, 0.0, 1.0, -3.0])) is None
+
+
+@pytest.mark.parametrize("frame", [np.eye(3), TURNED[:3, :3], TURNED[:3, :3] @ np.diag([1.0, -1.0, 1.0])])
+def test_a_prism_is_the_hull_of_its_corners(frame):
+    """Also in a left-handed frame; corners on a straight line are none."""
+    drawn = prism(np.array([(0, 0), (2, 0), (4, 0), (5, 3), (2, 5), (-1, 2.0)]), -1.0, 2.0, frame)
+    made = trimesh.Trimesh(drawn.vertices, drawn.faces, process=False)
+    outline = ConvexHull(np.array([(0, 0), (4, 0), (5, 3), (2, 5), (-1, 2.0)]))
+    assert made.is_watertight
+    assert made.volume == pytest.approx(3.0 * outline.volume)
+    assert (len(drawn.vertices), len(drawn.planes), len(drawn.edges)) == (10, 7, 15)
+    truth = hull(drawn.vertices)
+    assert sorted(drawn.planes.round(9).tolist()) == sorted((truth.planes.round(9) + 0.0).tolist())
 
 
 @pytest.mark.parametrize("tilt", [0.0, 8e-10, -8e-10])

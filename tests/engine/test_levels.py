@@ -16,6 +16,7 @@ from clamp3d.engine.facets import rods_distance
 from clamp3d.engine.farthest import Pieces, Sheet, farthest
 from clamp3d.engine.mesh_distance import are_apart, meshes_distance, nearest_points, surface_distance
 from clamp3d.engine.model import ModelCache
+from clamp3d.engine.near_faces import FaceMeshes, near_faces
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
@@ -45,6 +46,38 @@ def sampled(one, count, seed=0):
 
 
 # --- Meshes -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_faces_that_can_be_the_nearest_are_those_whose_triangles_are():
+    """Of two balls with a face for each column of triangles, each by itself, off by 0.01 and 0.02 mm."""
+    balls = []
+    for number, error in ((12, 0.01), (30, 0.02)):
+        made = trimesh.creation.uv_sphere(radius=5.0, count=(9, number))
+        angle = np.arctan2(*made.triangles_center.T[:2])
+        face = 7 + 2 * np.floor((angle + math.pi) / (2.0 * math.pi) * number).astype(int)
+        balls.append(FaceMeshes(Surface(made.vertices, made.faces, np.full(len(made.faces), error)), face))
+    a, b = balls
+    T = translation(10.4, 3.0, 1.0) @ rotation((1.0, 2.0, 3.0), 0.7)
+    gap = nearest_points(a.surface, b.surface, T)[1]
+    for one, other, pose, chosen in zip((a, b), (b, a), (T, inverse(T)), near_faces(a, b, T), strict=True):
+        low, high = one.boxes
+        for k, number in enumerate(one.numbers):
+            rows = one.surface.faces[one.face == number]
+            corners = one.surface.vertices[rows].reshape(-1, 3)
+            assert (low[k], high[k]) == (pytest.approx(corners.min(axis=0)), pytest.approx(corners.max(axis=0)))
+            apart = nearest_points(Surface(one.surface.vertices, rows), other.surface, pose)[1]
+            assert (number in chosen) == (apart <= gap + 2.0 * 0.03)
+    assert near_faces(a, b, translation(9.0, 0.0, 0.0)) is None  # they meet
+    assert near_faces(a, FaceMeshes(a.surface, 0 * a.face), T) is None  # there are few
+    assert near_faces(a, None, T) is None
+
+
+@pytest.mark.parametrize(("sides", "stands_out"), [(24, True), (6, True), (5, False)])
+def test_round_faces_through_the_corners_stand_out_of_their_facets_by_a_sagitta(sides, stands_out):
+    """Facets that turn by more than 65 degrees are no round face; the box is larger by the stated error besides."""
+    bar = mesh_shape(trimesh.creation.cylinder(4.0, 10.0, sections=sides), "round", error=0.25)
+    more = 0.25 + stands_out * 4.0 * (1.0 - math.cos(math.pi / sides))
+    assert MODELS.model(bar).bounds == pytest.approx(surface(bar).box + np.array([[-more], [more]]))
 
 
 @pytest.mark.parametrize(("e", "f"), [(0.0, 0.0), (0.1, 0.0), (0.0, 0.2), (0.1, 0.2)])
@@ -382,4 +415,5 @@ def test_bounds_at_many_poses_hold_for_each_of_them(holder, radius, length, seed
         one = distance(holder, wire, pose, cache=MODELS)
         assert many.lower[k] <= max(one.upper, 0.0) + 1e-9
         assert one.lower <= many.upper[k] + 1e-9
+        assert not 1e-9 < many.upper[k] - many.lower[k] < np.inf  # where both are known, but for rounding
     assert_distance(distance(holder, wire, T[0], cache=MODELS), holder, wire, T[0], cells=4000)

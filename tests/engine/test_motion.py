@@ -11,6 +11,7 @@ import trimesh
 
 from clamp3d import InputError, Motion, Scene, Verdict, check, first_contact, shapes
 from clamp3d.engine import moving_pair
+from clamp3d.engine.moving_groove import MovingInGroove
 from clamp3d.kernel import Cylinder, SweptArc, rotation, translation
 from clamp3d.output.scene_report import check_to_text
 from clamp3d.output.wording import circumstances
@@ -31,6 +32,28 @@ def test_a_part_that_hardly_turns_arrives_too(angle, far):
     np.testing.assert_allclose(motion.at(1.0, start), goal, rtol=4e-16, atol=1e-11)
     middle = 0.5 * (start[:3, 3] + goal[:3, 3])
     np.testing.assert_allclose(motion.at(0.5, start)[:3, 3], middle, rtol=4e-16, atol=max(1e-11, 50.0 * angle))
+
+
+def test_who_is_met_between_two_of_the_times_that_are_looked_at_and_who_is_behind():
+    """On its arc of 1 m the tip is 0.12 mm further out, midway between two of 33 times, than at either."""
+    tip, angle = shapes.box((0.02, 0.02, 0.02)), 10.5 / 32.0
+    scene = Scene().add("tip", tip, rotation((0, 0, 1), -angle) @ translation(1000.0, 0.0, 0.0))
+    scene = scene.add("ahead", tip, translation(1000.025, 0.0, 0.0)).add("behind", tip, translation(700.0, -700.0, 0.0))
+    result = check(scene.with_motion(Motion.screw((0, 0, 1), 1.0, parts="tip")))
+    (row,) = result.motions
+    assert (row.b, row.verdict, row.t) == ("ahead", Verdict.CONTACT, pytest.approx(angle, abs=1e-4))
+    assert row.distance.upper == pytest.approx(0.005, abs=1e-5)
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.3, 0.0, 1.0)])
+def test_a_wire_on_a_wide_arc_is_never_nearer_than_the_bound_of_its_way(axis):
+    """Midway it goes along the groove, or stands on its edge; before and after the arc leads it into the groove."""
+    middle, point = translation(0.2, -0.3, 0.0), np.array((0.0, -300.0, 0.0))
+    turn = Motion.screw(axis, 0.8, point=point)
+    pair = MovingInGroove(SweptArc(7.0, 1.2, 2000.0), Cylinder(6.0, 10.0), turn, turn.at(-0.5, middle), None)
+    for half in (0.5, 0.2, 0.05):
+        times = np.linspace(0.5 - half, 0.5 + half, 41)
+        assert pair.between(times[0], times[-1]) <= min(pair.contact(t).distance for t in times)
 
 
 def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():

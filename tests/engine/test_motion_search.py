@@ -41,6 +41,23 @@ def test_least_and_first_time_of_the_minimum_of_cones(peaks):
     assert first_time(exactly(f), 3.0, value - 1e-3) is None
 
 
+def test_a_distance_is_asked_for_with_how_far_it_can_change_in_its_stretch():
+    """Where the bounds by the speed 8 from both ends meet, the search asks; the first contact halves its stretch."""
+    ways = []
+
+    def distance(t, way):
+        ways.append((t, way))
+        return (4.0 + 4.0 * t,) * 2
+
+    answer = least(distance, 8.0, accuracy=0.1)
+    assert (answer.t, answer.upper, 3.9 <= answer.lower <= 4.0) == (0.0, 4.0, True)
+    assert ways[:4] == [(0.0, 8.0), (1.0, 8.0), (0.25, 6.0), (0.0625, 1.5)]
+    ways.clear()
+    first = first_time(lambda t, way: distance(1.0 - t, way), 8.0, 6.0, accuracy=0.1)
+    assert first == pytest.approx(0.5, abs=0.1 / 8.0)
+    assert ways[:4] == [(1.0, 8.0), (0.0, 8.0), (0.5, 4.0), (0.75, 2.0)]
+
+
 @given(st.lists(st.tuples(times, st.floats(0.0, 5.0)), min_size=1, max_size=6), st.floats(0.0, 2.0))
 def test_a_distance_that_is_large_enough_for_its_stretch_may_be_known_loosely(peaks, off):
     value = min(v for _, v in peaks)

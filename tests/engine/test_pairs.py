@@ -266,5 +266,6 @@ def test_duplicates_can_be_meant():
 def test_a_rule_says_what_it_allows():
     assert str(Allowed("a", "b")) == "a:b"
     assert str(Allowed("bolt*", "plate", 0.05)) == "bolt*:plate up to 0.05 mm"
+    assert str(Allowed("#1", "#2")) == "#1:#2"
     assert str(Allowed(relation="thread", overlap=0.5)) == "thread up to 0.5 mm"
     assert str(Allowed("*", "nut", relation="thread")) == "thread *:nut"

@@ -14,7 +14,12 @@ from tests.fit.fit_shapes import CENTRE_HEIGHT, CENTRES, HALF, LENGTH, RADIUS, o
 def fitted(mesh, sigma=0.0):
     """The fit of a mesh whose corners are scattered by ``sigma`` mm, in single precision."""
     V = mesh.vertices + np.random.default_rng(0).normal(0.0, sigma, mesh.vertices.shape)
-    return fit_mesh(make_mesh(V.astype(np.float32).astype(np.float64), mesh.faces, float32=True))
+    return fit_mesh(make_mesh(V.astype(np.float32).astype(np.float64), mesh.faces, float32=True), progress=followed)
+
+
+def followed(stage, share):
+    assert stage in ("strips", "patches")
+    assert 0.0 <= share <= 1.0
 
 
 def check_grooves(result, T=None):
@@ -72,7 +77,7 @@ def test_mirrored_part_keeps_its_grooves():
 
 def test_scan_within_three_standard_errors():
     sigma = 0.05
-    result = fit_mesh(make_mesh(*scan(1.5, sigma, 0)))
+    result = fit_mesh(make_mesh(*scan(1.5, sigma, 0)), progress=followed)
     (g,) = result.features
     assert g.name == "G1"
     R, middle = g.T_part_feature[:3, :3], g.T_part_feature[:3, 3]
@@ -134,6 +139,15 @@ def test_nothing_is_made_up(mesh):
     assert not result.grooves
     assert not result.features
     assert "no groove: no concave circular arc found" in result.notes
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("gap", "count"), [(4.0, 1), (6.0, 2)])
+def test_bars_in_line_are_one_up_to_a_quarter_of_the_shorter_one_apart(gap, count, side):
+    bars = [trimesh.creation.cylinder(5.0, length, sections=32) for length in (20.0, 30.0)]
+    bars[1].apply_translation((0.0, 0.0, side * (25.0 + gap)))
+    lengths = [bar.length for bar in fitted(trimesh.util.concatenate(bars)).cylinders]
+    assert lengths == pytest.approx([50.0 + gap] if count == 1 else [30.0, 20.0], abs=1e-4)
 
 
 @pytest.mark.parametrize("flank_deg", [20.0, 60.0])

@@ -1,6 +1,7 @@
 """Outlines of arcs and segments against their points and shapely, and shapes that are drawn by one call."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ ANGLE = [(0.0, 0.0), (10.0, 0.0), (10.0, 2.0), (2.0, 2.0), (2.0, 10.0), (0.0, 10
 
 def test_a_box_takes_three_numbers_or_one_sequence():
     assert box(10, 20.0, 5) == box((10, 20, 5)) == box(size=np.array([10.0, 20.0, 5.0]))
+    named = replace(box(10, 20, 5), name="a", title="b", volume=1000.0, not_modelled="c")
+    assert named == box(10, 20, 5)  # equal outlines are equal solids
 
 
 @pytest.mark.parametrize("outline", [ANGLE, ANGLE[::-1], [*ANGLE, ANGLE[0]], Profile.of(*ANGLE)])
