@@ -1,4 +1,4 @@
-"""Answers of the engine as they were once recorded, with the work that they took: a change of any number is seen.
+"""Answers of the engine as they were once recorded: a change of any number is seen.
 
 What they were judged by then is in the other files here. ``python -m tests.engine.test_recorded`` records them again.
 """
@@ -53,18 +53,15 @@ def two_bodies(number):
     return a, b, random_pose(rng, GAPS[number % 4], a, b)
 
 
-def checked(scene, **options):
-    """The rows of a check, and what it built and asked."""
-    result = check(scene, **options)
-    work = {key: getattr(result.work, key) for key in ("meshes", "triangles", "hulls", "fits", "queries", "decided")}
-    return {"rows": [row.to_dict() for row in result.rows], "asked": work}
+def rows(scene, **options):
+    return [row.to_dict() for row in check(scene, **options).rows]
 
 
 def pair(a, b, T):
     """What is said of two bodies: by a check, by one that measures all, and by the distance alone."""
     scene = Scene(clearance=0.5).add("a", a).add("b", b, T)
-    measured = {"distances": checked(scene, distances=True), "distance": distance(a, b, T).to_dict()}
-    return {"bodies": f"{a.name}, {b.name}", **checked(scene), **measured}
+    measured = {"measured": rows(scene, distances=True), "distance": distance(a, b, T).to_dict()}
+    return {"bodies": f"{a.name}, {b.name}", "rows": rows(scene), **measured}
 
 
 def pairs(numbers):
@@ -80,10 +77,10 @@ def motions(numbers):
         way, turn = 8.0 * rng.normal(size=3), Motion.screw(rng.normal(size=3), 1.2, travel=6.0, parts="b", name="turn")
         motion = (Motion.translate(way, parts="b"), turn, replace(turn, travel=way))[number % 3]
         scene = Scene(clearance=0.5).add("a", a).add("b", b, T @ translation(*(-0.5 * way)))
-        answers.append({"bodies": f"{a.name}, {b.name}", **checked(scene.with_motion(motion))})
+        answers.append({"bodies": f"{a.name}, {b.name}", "rows": rows(scene.with_motion(motion))})
         for ask in (first_contact, min_clearance):
             answer = ask(a, b, motion, scene.parts[1].T_world)
-            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution", "evaluations")})
+            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution")})
             answers.append(answer.distance.to_dict())
     return answers
 
@@ -121,7 +118,7 @@ def grooves(numbers):
         motion = replace(Motion.screw(axis, 0.05 * (number - 1), point=point), travel=np.array((0.4, -0.9, 8.0)))
         for ask in (first_contact, min_clearance):
             answer = ask(SweptArc(7.0, 1.2, 50.0), wire, motion, start)
-            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution", "evaluations")})
+            answers.append({key: getattr(answer, key) for key in ("touches", "t", "resolution")})
             answers.append(answer.distance.to_dict())
     return answers
 
