@@ -40,8 +40,8 @@ _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
 """About how many places of a spline are looked at besides those of each triangle."""
-_AT_ONCE = 200_000
-"""Pairs of a place and a triangle that are looked at together: some 20 MB."""
+_EDGE = 1e-9
+"""How far beside a triangle, relative to it, a place is still in it: none falls between two."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,23 +168,29 @@ def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Ar
     empty[tuple(cells)] = False
     middles = [0.5 * (grid[1:] + grid[:-1])[rows] for grid, rows in zip(grids, np.nonzero(empty), strict=True)]
     at = np.column_stack(middles)[:: 1 + int(empty.sum()) // _MOST_PLACES]
-    groups = np.array_split(at, 1 + len(at) * len(triangles) // _AT_ONCE)
-    row = np.concatenate([_triangle_at(some, uv[triangles]) for some in groups])
-    row, true = row[row >= 0], points_on(face, at[row >= 0])
+    place, row = _inside(at, uv[triangles])
+    true = points_on(face, at)[place]
     np.maximum.at(off, row, np.linalg.norm(closest_points(points[triangles[row]], true) - true, axis=1))
     return off
 
 
-def _triangle_at(places: Array, triangles: Array) -> IntArray:
-    """Which of triangles (m, 3, 2) in the plane each of the places (n, 2) is in: numbers (n,), -1 for none."""
-    side = np.roll(triangles, -1, axis=1) - triangles
-    away = places[:, None, None] - triangles
+def _inside(places: Array, triangles: Array) -> tuple[IntArray, IntArray]:
+    """Numbers (k,) of places (n, 2) of the plane, and of the triangles (m, 3, 2) that each of them is in."""
+    if not len(places):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    from rtree import index
+
+    boxes = np.arange(len(triangles)), triangles.min(axis=1), triangles.max(axis=1)
+    tree: Any = index.Index(boxes, properties=index.Property(dimension=2))
+    row, count = tree.intersection_v(places, places)
+    row, place = row.astype(np.int64), np.repeat(np.arange(len(places)), count.astype(np.int64))
+    corners = triangles[row]
+    side, away = np.roll(corners, -1, axis=1) - corners, places[place, None] - corners
     areas = side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0]  # signed, of a side and the place
-    whole = areas.sum(axis=2)
-    least = (np.sign(whole)[..., None] * areas).min(axis=2)
-    share = np.divide(least, np.abs(whole), out=np.full_like(whole, -np.inf), where=whole != 0.0)
-    row = share.argmax(axis=1)
-    return np.where(share[np.arange(len(row)), row] >= -1e-9, row, -1)
+    whole = areas.sum(axis=1)
+    is_inside = (np.sign(whole)[:, None] * areas).min(axis=1) >= -_EDGE * np.abs(whole)
+    is_inside &= whole != 0.0
+    return place[is_inside], row[is_inside]
 
 
 def _grid(surface: Any, along: str) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -127,45 +126,25 @@ def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
 
 
 def _reach(solid: Any, places: list[Array | None], radius: float) -> float:
-    """How far (mm) from z a solid, whose faces have these places, is turned about it, if that is beyond ``radius``."""
+    """How far (mm) from z a solid, whose faces have these places, is turned about it, if that is beyond ``radius``.
+
+    Lemma: surfaces that are turned about one axis meet in circles about it, or are the same. So nearer to the axis than
+    all other faces the solid's surface is turned, too, wherever its edges are.
+    """
     faces = [*explore(solid, "FACE")]
     others = [face for face, place in zip(faces, places, strict=True) if place is None]
-    edges: dict[int, list[tuple[Any, Array | None]]] = defaultdict(list)
-    for face, place in zip(faces, places, strict=True):
-        for edge in explore(face, "EDGE"):
-            edges[hash(edge)].append((edge, place))  # of two edges with one hash neither is a seam
-    for beside in edges.values():
-        edge, sides = beside[0][0], [place for _, place in beside]
-        if not (occ.BRep_Tool.Degenerated_s(edge) or _is_about_axis(edge) or _is_seam(sides)):
-            others.append(edge)
-    return min((_from_axis(shape, radius) for shape in others), default=math.inf)
+    return min((_from_axis(face, radius) for face in others), default=math.inf)
 
 
-def _is_about_axis(edge: Any) -> bool:
-    """Whether an edge is an arc about z."""
-    curve = occ.BRepAdaptor_Curve(edge)
-    if curve.GetType() != occ.GeomAbs_CurveType.GeomAbs_Circle:
-        return False
-    circle = curve.Circle()
-    off, lean = circle.Location().Coord()[:2], circle.Axis().Direction().Coord()[:2]
-    return math.hypot(*off) <= _ALIKE and math.hypot(*lean) <= _PARALLEL
-
-
-def _is_seam(sides: list[Array | None]) -> bool:
-    """Whether both sides of an edge are on one surface turned about z."""
-    places = [place for place in sides if place is not None]
-    return len(places) == len(sides) == 2 and bool(np.abs(places[0] - places[1]).max() <= _ALIKE)
-
-
-def _from_axis(shape: Any, radius: float) -> float:
-    """How far (mm) a shape is from z at least, exactly where its box does not keep ``radius``."""
-    low, high = bounds_of(shape, quick=True)
+def _from_axis(face: Any, radius: float) -> float:
+    """How far (mm) a face is from z at least, exactly where its box does not keep ``radius``."""
+    low, high = bounds_of(face, quick=True)
     away = math.hypot(*np.maximum(np.maximum(low, -high), 0.0)[:2])
     if away > radius:
         return away
     ends = [occ.gp_Pnt(0.0, 0.0, z) for z in (low[2] - _BEYOND, high[2] + _BEYOND)]
     axis = occ.BRepBuilderAPI_MakeEdge(*ends).Edge()
-    return float(occ.BRepExtrema_DistShapeShape(axis, shape).Value())
+    return float(occ.BRepExtrema_DistShapeShape(axis, face).Value())
 
 
 def _cut(solid: Any, angle: float, wide: float, low: float, high: float) -> Any:
