@@ -109,26 +109,28 @@ class Surface:
         return _nearest_tree(self.vertices, self.faces)
 
     @cached_property
-    def _compact(self) -> tuple[Any, Array, NDArray[np.int64], NDArray[np.int64]]:
-        """Tree, vertices and faces of the same surface without slender triangles, and which each is a piece of."""
-        corners, source = _without_slender(self.vertices[self.faces])
-        if len(source) == len(self.faces):
-            return self._tree, self.vertices, self.faces, source
-        vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(source)).reshape(-1, 3)
-        return _nearest_tree(vertices, faces), vertices, faces, source
+    def _compact(self) -> tuple[Any, Array, NDArray[np.int64]]:
+        """Tree, vertices and faces of the same surface without slender triangles."""
+        corners = _without_slender(self.vertices[self.faces])
+        if len(corners) == len(self.faces):
+            return self._tree, self.vertices, self.faces
+        vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+        return _nearest_tree(vertices, faces), vertices, faces
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:
         """Distance (k,) of points (k, 3) from the surface, the triangle (k,) that is nearest, and its point (k, 3)."""
         if not len(points):
             return np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3))
         points = np.ascontiguousarray(points, dtype=np.float64)
-        tree, vertices, faces, source = self._compact
-        square, face, foot = tree.squared_distance(vertices, faces, points)
-        return np.sqrt(np.atleast_1d(square)), source[np.atleast_1d(face)], np.asarray(foot).reshape(-1, 3)
+        square, face, foot = self._tree.squared_distance(self.vertices, self.faces, points)
+        return np.sqrt(np.atleast_1d(square)), np.atleast_1d(face), np.asarray(foot).reshape(-1, 3)
 
     def distance(self, points: Array) -> Array:
-        """Distance (k,) of points (k, 3) from the surface, never negative."""
-        return self.nearest(points)[0]
+        """Distance (k,) of points (k, 3) from the surface, never negative; that of `nearest` may be too large."""
+        if not len(points):
+            return np.empty(0)
+        tree, *mesh = self._compact
+        return np.asarray(np.sqrt(np.atleast_1d(tree.squared_distance(*mesh, np.ascontiguousarray(points))[0])))
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points (k, 3), none of them on the surface, lie inside.
@@ -257,12 +259,13 @@ class Surface:
         return np.asarray(corner[self.faces].max(axis=1))
 
 
-_SLENDER, _MOST_PIECES = 300.0, 100_000
-"""Ratio of length to width beyond which triangles are halved, and how many are added for that at most.
+_ROUNDED, _EXACT = 1e-16, 1e-7
+"""libigl's nearest point of a triangle of length L and width w is off by up to ``_ROUNDED`` L^3 / w^2, as was seen.
 
-libigl's nearest point of a triangle is off by some 1e-16 of its length times the square of that ratio: of one 1000 mm
-long and 0.01 mm wide by 1e-4 mm.
+Of one 1000 mm long and 0.01 mm wide it is 1e-4 mm and more; triangles for which it is more than ``_EXACT`` mm are cut.
 """
+_MOST_PIECES = 200_000
+"""Triangles that are added for that at most."""
 _CONTACTS = 100
 """Contacts of each triangle that FCL lists at most, so that its answer does not fill the memory."""
 _MIDDLE = 1e-4
@@ -280,25 +283,22 @@ def _nearest_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
     return tree
 
 
-def _without_slender(corners: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Triangles (k, 3, 3), the slender ones of (m, 3, 3) halved, and which (k,) each is a piece of.
+def _without_slender(corners: Array) -> Array:
+    """Triangles (k, 3, 3), the slender ones of (m, 3, 3) halved.
 
     Those that are next to nothing stay: their neighbours are as near.
     """
-    source, hair = np.arange(len(corners)), 1e-9 * float(np.abs(corners).max())
     most = len(corners) + _MOST_PIECES
     while True:
-        length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        _, area = normals_and_areas(corners)
-        longest = length.max(axis=1)
-        width = 2.0 * area / np.maximum(longest, 1e-300)
-        rows = np.flatnonzero((longest > _SLENDER * width) & (width > hair))
+        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        length = sides.max(axis=1)
+        width = 2.0 * normals_and_areas(corners)[1] / np.maximum(length, 1e-300)
+        rows = np.flatnonzero((_ROUNDED * length**3 > _EXACT * width**2) & (width > _EXACT))
         if not 0 < len(rows) <= most - len(corners):
-            return corners, source
-        edge = length[rows].argmax(axis=1)
+            return corners
+        edge = sides[rows].argmax(axis=1)
         pieces = halves(corners[rows], edge, edge_middles(corners[rows])[np.arange(len(rows)), edge])
         corners = np.concatenate([np.delete(corners, rows, axis=0), pieces])
-        source = np.concatenate([np.delete(source, rows), np.tile(source[rows], 2)])
 
 
 def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
