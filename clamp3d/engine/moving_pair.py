@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
-from clamp3d.engine.model import Model, box_corners
+from clamp3d.engine.model import DRAWN_CHORDS, Model, box_corners
 from clamp3d.engine.motion_search import ACCURACY, Spent, first_time, least
 from clamp3d.engine.refine import accuracy_for, from_boxes, refine, with_normal
 from clamp3d.engine.swept import HALF_TURN, swept_lower
@@ -24,6 +24,8 @@ BUDGET = 5000
 """Work of one search, in evaluations by closed forms or meshes, which take about a millisecond."""
 _HEAVY = 50
 """How many of those one by Open CASCADE counts for, or one that needs the common part of two meshes."""
+_FINE = 20
+"""The same for one that asks for the finest meshes of drawn bodies, of thousands of triangles each."""
 _UNINFORMATIVE = 8
 """Swept bounds in a row that said no more than the speed, after which they are no longer asked for."""
 
@@ -66,10 +68,13 @@ class MovingPair:
     def at(self, t: float, enough: Enough) -> Distance:
         """Distance at time ``t``, refined until ``enough``."""
         self.evaluations += 1
-        T = self.pose(t)
+        T, before = self.pose(t), self.a.counters.queries["meshes"]
         distance = refine(self.a, self.b, T, from_boxes(self.a, self.b, T), enough, cad_forms=True)
-        is_heavy = distance.level == "exact" or (distance.level == "meshes" and distance.lower <= 0.0)
-        self.work += _HEAVY if is_heavy else 1
+        meshes = self.a.counters.queries["meshes"] - before
+        if distance.level == "exact" or (distance.level == "meshes" and distance.lower <= 0.0):
+            self.work += _HEAVY
+        else:
+            self.work += _FINE if meshes == len(DRAWN_CHORDS) else 1
         return distance
 
     def budget(self) -> Spent:
