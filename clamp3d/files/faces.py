@@ -28,6 +28,8 @@ _SIZES: dict[str, tuple[str, ...]] = {
 
 _ALIKE = 1e-7
 """How far (mm) a spline may be from a plane, cylinder, cone, ... to count as one: Open CASCADE's confusion."""
+_TOLERANCES = (_ALIKE, 1e-6, 1e-5)
+"""What Open CASCADE is asked with: it takes planes that are turned for splines at less than some 1e-6."""
 _MOST_PLACES = 20_000
 """Points of a spline that are looked at to see that it is a plain surface, at most: some 50 ms."""
 _STEP = 1e-4
@@ -82,10 +84,9 @@ def _canonical(face: Any) -> tuple[int, Array, Array]:
     kind, frame, size = form_of(occ.BRepAdaptor_Surface(face))
     spline = occ.BRep_Tool.Surface_s(face)
     if kind == OTHER and isinstance(spline, occ.Geom_BSplineSurface):
-        plain = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(_ALIKE)
-        if plain is not None:
-            form = form_of(occ.GeomAdaptor_Surface(plain))
-            if _coincides(spline, *form):
+        for tolerance in _TOLERANCES:
+            plain = occ.GeomConvert_SurfToAnaSurf(spline).ConvertToAnalytical(tolerance)
+            if plain is not None and _coincides(spline, *(form := form_of(occ.GeomAdaptor_Surface(plain)))):
                 return form
     return kind, frame, size
 

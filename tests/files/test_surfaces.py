@@ -14,7 +14,21 @@ from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
 from clamp3d.files.tessellation import _deviation, border_sag, tessellate, triangles_of
-from tests.cad import array_of, ball, block, cone, cut, first_solid, location, moved, random_pose, ring, rod, turn
+from tests.cad import (
+    array_of,
+    ball,
+    block,
+    cone,
+    cut,
+    first_solid,
+    location,
+    moved,
+    random_pose,
+    ring,
+    rod,
+    shift,
+    turn,
+)
 from tests.files.assemblies import write_step
 from tests.public.placed_pairs import arch
 
@@ -248,3 +262,16 @@ def test_a_border_whose_parameters_are_uneven_is_off_by_what_it_bends_alone(bend
     points, triangles, _ = triangles_of(face, 0)
     found = border_sag(face, points, triangles).max()
     assert found == pytest.approx(2.0 * sag, rel=0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("far", [0.0, 800.0])
+def test_planes_are_planes_however_their_splines_are_turned(far):
+    """At the tolerance that they keep Open CASCADE takes every third for none."""
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        solid = first_solid(as_splines(moved(block((-22, -22, -7), (22, 22, 7)), shift(far) @ random_pose(rng))))
+        form = faces.surfaces_of([*explore(solid, "FACE")])
+        assert set(form.kind.tolist()) == {PLANE}
+        corners = np.array([occ.BRep_Tool.Pnt_s(vertex).Coord() for vertex in explore(solid, "VERTEX")])
+        for kind, frame, size in zip(form.kind, form.frame, form.size, strict=True):
+            assert (np.abs(height(kind, frame, size, corners)) <= 1e-7).sum() == 4 * 6  # each of 8 is met 6 times
