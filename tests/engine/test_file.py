@@ -124,7 +124,10 @@ def test_motions():
         (BOX + "pose.matrix = [[-1,0,0,0],[0,1,0,0],[0,0,1,0]]\n", "pose.matrix: must be rigid: it reflects"),
         (BOX + "holes = [{ radius = 3, at = [90, 0] }]\n", "parts.box: hole of radius 3 mm at (90.0, 0.0) lies beside"),
         (BOX + "holes = [{ radius = 3, diameter = 6 }]\n", "holes.0.radius: give exactly one of radius, diameter"),
-        (BOX + f"holes = [{HALF % -10}, {HALF % 10}]\n", "parts.box: 2 holes together leave nothing of the part"),
+        (
+            BOX + f"holes = [{HALF % -10}, {HALF % 10}]\n",
+            "2 holes together leave nothing of the part that is thicker than 0.006 mm",
+        ),
         (BOX + "pose = { quaternion = [0, 0, 0, 2] }\n", "parts.box.pose.quaternion: must have length 1, got 2"),
         (BOX + "pose = { translation = [nan, 0, 0] }\n", "parts.box.pose.translation.0: must be a finite number"),
         (BOX + '[[allowed]]\nparts = ["box", "bax"]\n', "allowed: unknown part 'bax'; available: box"),
