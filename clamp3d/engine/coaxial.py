@@ -19,7 +19,7 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.turned import CHORD, PLANE_AT, Section, axis_of, places_about
+from clamp3d.files.turned import CHORD, PLANE_AT, Section, axis_of, turned_about
 from clamp3d.geometry.manifolds import arrays_of, prism
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target, translation
 
@@ -42,10 +42,10 @@ def _about_axis(turned: Model, other: Model, T: Array, enough: Enough) -> Distan
     assert other.exact is not None
     form, others = turned.exact.surfaces, other.exact.surfaces
     axis = axis_of(form)
-    if axis is None or any(place is None for place in places_about(form, axis)):
+    if axis is None or not turned_about(form, axis).all():
         return None
     there = inverse(T) @ axis
-    if all(place is None for place in places_about(others, there)):
+    if not turned_about(others, there).any():
         return None
     own_axis = axis_of(others, there)
     if own_axis is None:  # of planes alone

@@ -8,10 +8,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from clamp3d.files.faces import CONE, CYLINDER, PLANE, SPHERE, TORUS, Surfaces, surfaces
+from clamp3d.files.faces import CYLINDER, PLANE, SPHERE, TORUS, Surfaces, surfaces
 from clamp3d.files.open_cascade import TOLERANCE, area_of, bounds_of, explore, from_bytes, moved, occ
-from clamp3d.geometry.pose import Array, inverse, to_target
+from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.profile import chord_angle, chord_count
 from clamp3d.geometry.triangles import distances_from_segments
 
@@ -65,7 +66,7 @@ def axis_of(form: Surfaces, about: Array | None = None) -> Array | None:
     """
     is_round = (form.kind >= CYLINDER) & (form.kind <= TORUS) & (form.kind != SPHERE)
     if about is not None:
-        is_round &= [place is not None for place in places_about(form, about)]
+        is_round &= turned_about(form, about)
     if not is_round.any():
         return None
     origin, _, y, z = form.frame[is_round.argmax()]
@@ -76,25 +77,13 @@ def axis_of(form: Surfaces, about: Array | None = None) -> Array | None:
     return axis
 
 
-def places_about(form: Surfaces, axis: Array) -> list[Array | None]:
-    """What tells surfaces that are turned about z of ``axis`` (4, 4) from each other; None for all others."""
+def turned_about(form: Surfaces, axis: Array) -> NDArray[np.bool_]:
+    """Which (n,) of the surfaces are turned about z of a pose (4, 4)."""
     T = inverse(axis)
-    every = zip(
-        form.kind.tolist(), to_target(T, form.frame[:, 0]), form.frame[:, 3] @ T[:3, :3].T, form.size, strict=True
-    )
-    return [_place(kind, origin, z, size) for kind, origin, z, size in every]
-
-
-def _place(kind: int, origin: Array, z: Array, size: Array) -> Array | None:
-    """Kind, height on the axis and sizes of a surface that is turned about the axis z; None for others."""
-    if kind > TORUS or (kind != SPHERE and math.hypot(*z[:2]) > _PARALLEL):
-        return None
-    if kind != PLANE and math.hypot(*origin[:2]) > _ALIKE:
-        return None
-    if kind == CONE:  # its tip, and which way it opens
-        sense = math.copysign(1.0, z[2])
-        return np.array([kind, origin[2] - sense * size[0] / math.tan(size[1]), sense * size[1], 0.0])
-    return np.array([kind, 0.0 if kind == CYLINDER else origin[2], *size])
+    off = np.hypot(*to_target(T, form.frame[:, 0]).T[:2])
+    lean = np.hypot(*(form.frame[:, 3] @ T[:3, :3].T).T[:2])
+    is_along = (form.kind == SPHERE) | (lean <= _PARALLEL)
+    return np.asarray((form.kind <= TORUS) & is_along & ((form.kind == PLANE) | (off <= _ALIKE)))
 
 
 @lru_cache(maxsize=512)
@@ -105,13 +94,14 @@ def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
     """
     axis = np.frombuffer(pose).reshape(4, 4)
     solid = moved(from_bytes(brep), inverse(axis))
-    places = places_about(surfaces(brep), axis)
-    reach = _reach(solid, places, radius)
+    form = surfaces(brep)
+    is_turned = turned_about(form, axis)
+    reach = _reach(solid, is_turned, radius)
     if reach <= radius:
         return None
     low, high = bounds_of(solid, quick=True)
     wide = min(reach, math.hypot(*np.maximum(high, -low)[:2]) + _BEYOND)
-    circles = _circles(places)
+    circles = _circles(form, is_turned, axis)
     sections = []
     for angle in _ANGLES:
         cut = _cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND)
@@ -125,15 +115,14 @@ def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
     return Section(loops, CHORD + TOLERANCE, reach)
 
 
-def _reach(solid: Any, places: list[Array | None], radius: float) -> float:
-    """How far (mm) from z a solid, whose faces have these places, is turned about it, if that is beyond ``radius``.
+def _reach(solid: Any, is_turned: NDArray[np.bool_], radius: float) -> float:
+    """How far (mm) from z a solid is turned about it, whose faces are or are not (n,), if that is beyond ``radius``.
 
     Lemma: surfaces that are turned about one axis meet in circles about it, or are the same. So nearer to the axis than
     all other faces the solid's surface is turned, too, wherever its edges are.
     """
-    faces = [*explore(solid, "FACE")]
-    others = [face for face, place in zip(faces, places, strict=True) if place is None]
-    return min((_from_axis(face, radius) for face in others), default=math.inf)
+    faces = zip(explore(solid, "FACE"), is_turned.tolist(), strict=True)
+    return min((_from_axis(face, radius) for face, turned in faces if not turned), default=math.inf)
 
 
 def _from_axis(face: Any, radius: float) -> float:
@@ -155,11 +144,13 @@ def _cut(solid: Any, angle: float, wide: float, low: float, high: float) -> Any:
     return occ.BRepAlgoAPI_Common(solid, face).Shape()
 
 
-def _circles(places: list[Array | None]) -> Array:
-    """Centres and radii (k, 3) in sections of the spheres and tori among surfaces."""
-    every = [(0.0, x[1], x[2]) for x in places if x is not None and x[0] == SPHERE]
-    every += [(side * x[2], x[1], x[3]) for x in places if x is not None and x[0] == TORUS for side in (-1.0, 1.0)]
-    return np.array(every).reshape(-1, 3)
+def _circles(form: Surfaces, is_turned: NDArray[np.bool_], axis: Array) -> Array:
+    """Centres and radii (k, 3) of spheres and tori that are turned about z of a pose (4, 4), in sections."""
+    heights = to_source(axis, form.frame[:, 0])[:, 2]
+    balls, rings = (np.flatnonzero(is_turned & (form.kind == kind)) for kind in (SPHERE, TORUS))
+    circles = [np.column_stack([np.zeros(len(balls)), heights[balls], form.size[balls, 0]])]
+    circles += [np.column_stack([side * form.size[rings, 0], heights[rings], form.size[rings, 1]]) for side in (-1, 1)]
+    return np.concatenate(circles)
 
 
 def _loop(wire: Any, angle: float, circles: Array) -> Array:
