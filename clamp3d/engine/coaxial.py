@@ -3,7 +3,7 @@
 Lemma: let one solid be turned about an axis, and within R of it, and the other up to S > R from that axis. Their
 distance, or S - R if that is less, is that of their sections by a plane through the axis: of all points at one distance
 from the axis and one height, those at the same angle as a given point are nearest to it. So it is with the depth of a
-point of one in the other.
+point of one in the other, if that is less than S - R.
 """
 
 from __future__ import annotations
@@ -63,8 +63,9 @@ def _about_axis(turned: Model, other: Model, T: Array, enough: Enough) -> Distan
     T_sections = translation(0.0, float(to_source(there, own_axis[:3, 3])[2]), 0.0)
     margin = around.reach - own.radius  # so far is what of the other solid is in no section
     distance = _sections_distance(own, around, T_sections, enough)
-    lower = min(distance.lower, margin) if distance.lower > -_HALF else -np.inf
-    return replace(distance, lower=lower, upper=max(distance.upper, -margin), method=METHOD).moved(axis @ PLANE_AT)
+    # A section ends at its reach, and a prism at its ends: what is deeper may lie further from the solid's surface.
+    lower = min(distance.lower, margin) if distance.lower > -min(margin, _HALF) else -np.inf
+    return replace(distance, lower=lower, method=METHOD).moved(axis @ PLANE_AT)
 
 
 def _sections_distance(a: Section, b: Section, T: Array, enough: Enough) -> Distance:

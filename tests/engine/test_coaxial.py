@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from clamp3d.engine.answer import Distance
 from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.judge import judge
 from clamp3d.engine.model import Counters, model_of
@@ -93,6 +94,17 @@ def test_an_overlap_that_is_deeper_than_its_section_shows_is_left_to_others():
     distance = coaxial_distance(tube, pin, AT_ORIGIN, lambda _: False)
     assert distance.lower == -np.inf
     assert -12.0 <= distance.upper < -0.01
+
+
+@pytest.mark.parametrize(("beside", "is_bounded"), [(1e-3, False), (0.0104, False), (0.0106, True), (0.5, True)])
+def test_how_deep_an_edge_is_in_a_block_is_not_told_by_the_nearest_side_of_it(beside, is_bounded):
+    """The end of a thin tube is 0.0105 mm below the top, and ``beside`` the middles of the block's sides."""
+    edge = cut(rod(6.0 - beside, -0.0105, 5.0), rod(5.995 - beside, -1.0, 6.0))
+    plate = model(block((-6, -6, -9), (6, 6, 0)))
+    distance = coaxial_distance(plate, model(edge), AT_ORIGIN, lambda d: d.lower >= -0.011)
+    assert distance.lower <= -0.0105 <= distance.upper
+    assert np.isfinite(distance.lower) == is_bounded
+    assert judge(plate, model(edge), AT_ORIGIN, Distance(), THRESHOLDS, None)[0] is Verdict.CLASH
 
 
 def test_halves_of_one_surface_are_turned_as_the_whole():
