@@ -150,11 +150,11 @@ def _extrude(shape: Extrusion, mesh_error: float, side: Side, overlap: float = 0
 
 
 def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
-    """The outline as polygons: one, or where tangents cross it the pieces that are left, or that are to be joined."""
+    """The outline as polygons: one, or where it crosses itself the pieces that are left, or that are to be joined."""
     from shapely import Polygon, make_valid, union_all
 
     whole = Polygon(profile.polygon(mesh_error, side))
-    if side == "chords" or whole.is_valid:
+    if whole.is_valid:
         return [whole]
     # Tangents cross a neighbour, or chords do in a thin wall: there the outline of chords is wrong only in the lenses
     # between chords and tangents. These are added or taken away by themselves, of all arcs.
@@ -163,7 +163,9 @@ def _polygons(profile: Profile, mesh_error: float, side: Side) -> list[Polygon]:
     for arc in profile.arcs:
         corners = [*arc.chords(mesh_error, arc.start), arc.end]
         lenses.append(Polygon([*corners, *reversed(arc.tangents(mesh_error, arc.start))]).buffer(0.0))
-    if side == "outer":  # their union in the plane would have cracks along the chords: `_extrude` joins the prisms
+    if side == "chords":
+        polygons = [chords]
+    elif side == "outer":  # their union in the plane would have cracks along the chords: `_extrude` joins the prisms
         polygons = [chords, *lenses]
     else:  # taken away a little wider, else slivers are left along chords of concave arcs, which lie outside
         width = _SLIVER * float(np.ptp(profile.bounds, axis=0).max())

@@ -249,9 +249,10 @@ class Profile:
     def _check_simple(self) -> None:
         """Raise InputError if the outline crosses itself; it may touch itself, and run along itself.
 
-        Then what it runs round twice, or the wrong way, counts twice in its area, or off it. Arcs are taken as chords.
+        Where it runs round twice, or the wrong way, it must be no wider than rounding, or as arcs are off their chords.
         """
-        from shapely import Polygon, make_valid
+        from shapely import Polygon, unary_union
+        from shapely.ops import polygonize
         from shapely.validation import explain_validity
 
         extent = max(np.ptp(self.bounds, axis=0))
@@ -262,9 +263,13 @@ class Profile:
         ring = Polygon(corners)
         if ring.is_valid:
             return
-        off = abs(make_valid(ring).area - (self.area - sum(self.chord_areas(error) * np.array([1.0, -1.0]))))
-        if off > (error if self.arcs else _CLOSURE * extent) * ring.length:
-            raise InputError(f"outline must not cross itself: {explain_validity(ring).lower()}")
+        narrow = ring.exterior.buffer(error if self.arcs else _CLOSURE * extent)
+        for face in polygonize(unary_union(ring.exterior)):
+            middle = face.representative_point()
+            to_corners = np.array(corners) @ (1.0, 1.0j) - complex(middle.x, middle.y)
+            turns = round(np.angle(np.roll(to_corners, -1) / to_corners).sum() / (2.0 * math.pi))
+            if turns not in (0, 1) and not narrow.covers(face):
+                raise InputError(f"outline must not cross itself: {explain_validity(ring).lower()}")
 
     @classmethod
     def of(cls, *pieces: Point | Arc) -> Profile:

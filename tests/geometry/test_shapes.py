@@ -217,6 +217,10 @@ test_outlines_that_are_open_clockwise_or_crossed_are_refused = refusals(
     (lambda: Profile.of((0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.5)), rf"{CROSSED}\[1.1111"),
     (lambda: Profile.of((-3, -1), Arc((0, 0), 3.0, -1.5, 1.5), (-3, 1), (4.0, 0.5), (-4, 0)), CROSSED),
     (lambda: Profile.of((-3e-3, -1e-3), Arc((0, 0), 3e-3, -1.5, 1.5), (-3e-3, 1e-3), (4e-3, 0), (-4e-3, 0)), "self"),
+    (
+        lambda: Profile.of((0, -15), (10, -15), Arc((10, 0), 10.01, -math.pi / 2, -1.5 * math.pi), (10, 15), (0, 15)),
+        "self",
+    ),
     # At a corner, and twice round.
     (lambda: Profile.of((1.0, 1.0), (0.0, 3.0), (2.0, 3.0), (1.0, 1.0), (0.0, 0.0), (5.0, 0.0)), CROSSED),
     (lambda: Profile.of((0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (0.0, 0.0), (3.0, 0.0), (0.0, 3.0)), CROSSED),
@@ -231,6 +235,15 @@ def test_an_outline_may_touch_itself_and_run_along_itself():
     assert Profile.of((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0), *bridge).area == 72.0
     crescent = [Arc((0.0, 0.0), 5.0, 0.0, math.pi), Arc((-1.0, 0.0), 4.0, math.pi, 0.0), (4.0, 0.0)]
     assert Profile.of(*crescent).area == pytest.approx(4.5 * math.pi)
+
+
+def test_the_mesh_of_an_outline_that_crosses_itself_within_rounding_is_not_inside_out():
+    """An arc stands out of the opposite side by 0.0015 mm."""
+    outline = Profile.of((-15, 0), Arc((0, 0), 10.0015, math.pi, 0.0), (15, 0), (15, 10), (-15, 10))
+    for error in (0.1, 0.001):
+        made = mesh(Solid("arch", (Extrusion(outline, "Z", 0.0, 2.0),)), error)
+        assert made.volume == pytest.approx(2.0 * outline.area, rel=0.02)
+        assert made.is_watertight
 
 
 def test_what_is_drawn_of_an_outline_is_its_points_along_an_axis():
