@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 DistanceAt = Callable[[float, float], tuple[float, float]]
 """Lower and upper bound (mm) of the distance at a time, and how far (mm) it can change in the time it is asked for."""
-BoundBetween = Callable[[float, float], float]
-"""Lower bound (mm) of the distance between two times."""
+BoundBetween = Callable[[float, float, float], float]
+"""Lower bound (mm) of the distance between two times; the last argument is one (mm) that is known already."""
 Spent = Callable[[], float]
 """The share of its budget of work that a search has spent: at 1 it ends."""
 
@@ -151,7 +151,7 @@ def _bounded(stretch: _Stretch, speed: float, bound: BoundBetween | None, enough
     way = speed * (stretch.stop - stretch.start)
     lower = max(stretch.lower, bound_by_speed(stretch.at_start, stretch.at_stop, way))
     if lower < enough and bound is not None:
-        lower = max(lower, bound(stretch.start, stretch.stop))
+        lower = max(lower, bound(stretch.start, stretch.stop, lower))
     return stretch._replace(lower=lower)
 
 

@@ -54,7 +54,7 @@ class MovingInGroove(MovingPair):
         """A distance at time ``t`` as the groove sees it, as which it was measured."""
         return distance
 
-    def between(self, start: float, stop: float) -> float:
+    def between(self, start: float, stop: float, by_speed: float = 0.0) -> float:
         """Lower bound (mm) of the distance between two times.
 
         Lemma: let the cylinder's points move from the middle time on by ``(t - middle) (a d + b z)`` and a rest, d its

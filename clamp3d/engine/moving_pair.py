@@ -90,8 +90,11 @@ class MovingPair:
         """Where the distance comes down to ``level`` mm, for a ``first`` time that is never late: that time itself."""
         return first
 
-    def between(self, start: float, stop: float) -> float:
-        """Lower bound (mm) of the distance between two times, from swept shapes; minus infinity if they say nothing."""
+    def between(self, start: float, stop: float, by_speed: float = 0.0) -> float:
+        """Lower bound (mm) of the distance between two times, from swept shapes; minus infinity if they say nothing.
+
+        They are asked for as long as they are above what the speed says, ``by_speed``, now and then.
+        """
         if self._uninformative >= _UNINFORMATIVE or not (self.a.closed and self.b.closed):
             return -np.inf
         middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
@@ -100,7 +103,7 @@ class MovingPair:
             return -np.inf
         poses = (self.pose(start), self.pose(middle), self.pose(stop))
         lower = swept_lower(self.a, self.b, *poses, angle=angle, screw=self.motion.is_screw)
-        self._uninformative = 0 if lower > 0.0 else self._uninformative + 1
+        self._uninformative = 0 if lower > by_speed else self._uninformative + 1
         return lower
 
     def least_distance(

@@ -11,6 +11,7 @@ import trimesh
 
 from clamp3d import InputError, Motion, Scene, Verdict, check, distance, first_contact, min_clearance, shapes
 from clamp3d.engine import moving_pair
+from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.moving_groove import MovingInGroove
 from clamp3d.geometry.profile import Arc, Profile
 from clamp3d.kernel import Cylinder, SweptArc, rotation, translation
@@ -55,6 +56,15 @@ def test_a_wire_on_a_wide_arc_is_never_nearer_than_the_bound_of_its_way(axis):
     for half in (0.5, 0.2, 0.05):
         times = np.linspace(0.5 - half, 0.5 + half, 41)
         assert pair.between(times[0], times[-1]) <= min(pair.contact(t).distance for t in times)
+
+
+def test_what_a_swept_shape_says_is_asked_no_more_where_the_speed_says_as_much():
+    """Hulls of swept meshes took ten times as long as all distances of a search."""
+    model = model_of(shapes.box((4, 4, 4)), Counters())
+    asked = moving_pair.MovingPair(model, model, Motion.translate((9, 0, 0)), translation(0.0, 9.0, 0.0), np.eye(4))
+    bounds = [asked.between(0.0, 1.0, by_speed) for by_speed in (4.9, *8 * [5.1], 4.9)]
+    assert bounds[:9] == pytest.approx([5.0] * 9)
+    assert bounds[9] == -np.inf
 
 
 def test_a_depth_is_no_margin_of_bodies_whose_depth_is_not_measured_on_the_way():

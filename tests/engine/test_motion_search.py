@@ -112,9 +112,9 @@ def test_a_constant_distance_needs_a_bound_between_times_or_ends_undecided():
     assert wide.lower < 0.0 < wide.upper
     assert near.times == 1000
     bounded = Counted(1e-5)
-    bounds = least(bounded, 100.0, bound=lambda start, stop: 1e-5)
+    bounds = least(bounded, 100.0, bound=lambda *_: 1e-5)
     assert (bounds.lower, bounds.upper, bounded.times) == (1e-5, 1e-5, 2)
-    assert first_time(bounded, 100.0, 0.0, bound=lambda start, stop: 1e-5) is None
+    assert first_time(bounded, 100.0, 0.0, bound=lambda *_: 1e-5) is None
     assert bounded.times == 4
 
 
