@@ -322,6 +322,9 @@ BASE, SLIDE = '<box size="0.1 0.1 0.02"/>', '<parent link="rail"/><child link="t
         ('scale="0.001', 'scal="0.001', "<mesh> has 'scal', not one of filename, scale"),
         ("</collision></link>", "</collision><collison/></link>", "<link> has 'collison', not one of inertial, visual"),
         ("robot", "robots", "it holds <robots>, not <robot>"),
+        (ROBOT[ROBOT.index(">", ROBOT.index("<robot")) + 1 : -9], "", "no links in the file"),
+        ('  <link name="tip">', '<x:arm xmlns:x="http://www.ros.org/wiki/xacro"/><link name="tip">', "expand them"),
+        ('  <link name="tip">', f'<lk><visual><geometry>{BASE}</geometry></visual></lk><link name="tip">', "in <lk>"),
     ],
 )  # fmt: skip
 def test_a_robot_that_is_not_whole_is_refused(tmp_path, text, instead, message):
