@@ -191,6 +191,9 @@ class Accepted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not self.why.strip():
             raise InputError(f"why must not be empty, got {shown(self.why)}")
 
+    def __str__(self) -> str:
+        return f"accepted by {self.who} on {self.when} ({self.why})"
+
 
 class _AcceptedFile(msgspec.Struct, forbid_unknown_fields=True):
     accepted: list[Accepted] = []

@@ -180,6 +180,9 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert code == 0
     assert out.count("accepted by Ada on 20") == 2
     assert "no finding now" not in out
+    assert main("report", "boxes.toml", "--output", "report")[0] == 0
+    assert (tmp_path / "report/report.html").read_text().count("accepted by Ada on 20") == 2
+    assert main("view", "boxes.toml", "--html", "page.html")[0] == 0
     main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen \U0001f600 größe \x07")
     assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 8})
