@@ -7,6 +7,7 @@ import math
 import random
 import re
 import shutil
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -180,6 +181,12 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert code == 0
     assert out.count("accepted by Ada on 20") == 2
     assert "no finding now" not in out
+    main("check", "boxes.toml", "--bcf", "a.bcf")
+    with zipfile.ZipFile("a.bcf") as package:
+        topics = [package.read(name) for name in package.namelist() if name.endswith("markup.bcf")]
+    assert [(b'TopicStatus="Closed"' in topic, b"<Description>accepted by Ada on" in topic) for topic in topics] == [
+        (True, True)
+    ] * 2
     assert main("report", "boxes.toml", "--output", "report")[0] == 0
     assert (tmp_path / "report/report.html").read_text().count("accepted by Ada on 20") == 2
     assert main("view", "boxes.toml", "--html", "page.html")[0] == 0
