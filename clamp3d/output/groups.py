@@ -208,7 +208,7 @@ def accepted_file(source: str) -> Path:
     'parts/hinge.accepted.toml'
     """
     path = Path(source) if Path(source).name not in ("", "..") else Path(source).resolve()
-    return path.with_name(f"{path.name if path.is_dir() else path.stem}.accepted.toml")
+    return path.parent / f"{path.name if path.is_dir() else path.stem}.accepted.toml"
 
 
 def read_accepted(path: Path) -> dict[str, Accepted]:

@@ -209,6 +209,7 @@ def test_folders_whose_names_differ_after_a_point_do_not_share_what_is_accepted(
     (tmp_path / "v1.3" / "sub").mkdir()
     monkeypatch.chdir(tmp_path / "v1.3" / "sub")
     assert main("accept", "..", "abcdefgh", "--why", "so")[0] == 0
+    assert main("check", "/")[0] == 2  # it has no name
     assert {path.name for path in tmp_path.glob("*.toml")} == {"v1.2.accepted.toml", "v1.3.accepted.toml"}
     assert [main("check", source)[0] for source in ("../../v1.2", "..")] == [0, 1]
 
