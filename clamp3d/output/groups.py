@@ -186,7 +186,7 @@ class Accepted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z2-7]{8}", self.id):
-            rule = "id of a finding must be 8 of a-z and 2-7, as check prints it at its end"
+            rule = "id of a finding must be 8 characters of a-z and 2-7, as check prints it at the end of its line"
             raise InputError(f"{rule}, got {shown(self.id)}")
         if not self.why.strip():
             raise InputError(f"why must not be empty, got {shown(self.why)}")

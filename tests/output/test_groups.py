@@ -276,7 +276,7 @@ BAD_ACCEPTED = [
     ('[accepted]\nid = "abcdefgh"', "why: accepted: must be a list, got"),
     ('[[accepted]]\nid = "abcdefgh"', "why: accepted.0.why is missing"),
     ('[[accepted]]\nid = "abcdefgh"\nwhy = " "', "why: accepted.0.why must not be empty, got ' '"),
-    ('[[accepted]]\nid = "zzz"\nwhy = "so"', "why: accepted.0.id of a finding must be 8 of a-z and 2-7"),
+    ('[[accepted]]\nid = "zzz"\nwhy = "so"', "why: accepted.0.id of a finding must be 8 characters of a-z and 2-7"),
     ('[[accepted]]\nid = 5\nwhy = "so"', "why: accepted.0.id: must be a text, got 5"),
     ('[[accepted]]\nid = "abcdefgh"\nwhy = "so"\nx = 1', "why: accepted.0.x is not a known key"),
 ]
@@ -290,8 +290,16 @@ BAD_ACCEPTED = [
         (("check", "boxes.toml", "--baseline", "deep.json"), {"deep.json": "[" * 100_000}, "not a result of `clamp3d"),
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
         *((("check", "boxes.toml"), {"boxes.accepted.toml": text}, message) for text, message in BAD_ACCEPTED),
-        (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
-        (("accept", "boxes.toml", "abcdefg1", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
+        (
+            ("accept", "boxes.toml", "xyz", "--why", "so"),
+            {},
+            "id of a finding must be 8 characters of a-z and 2-7, as check",
+        ),
+        (
+            ("accept", "boxes.toml", "abcdefg1", "--why", "so"),
+            {},
+            "id of a finding must be 8 characters of a-z and 2-7, as check",
+        ),
         (("accept", "boxs.toml", "abcdefgh", "--why", "so"), {}, "boxs.toml: no such file or folder"),
         (("accept", "boxes.toml", "00000000"), {}, "Missing option '--why'"),
         (("accept", "boxes.toml", "00000000", "--why", " "), {}, "the reason (--why) must not be empty, got ' '"),
