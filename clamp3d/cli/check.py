@@ -100,7 +100,7 @@ class Check(Source, Quiet):
         if self.bcf_file is not None:
             from clamp3d.output.bcf import write_bcf
 
-            write_bcf(result, self.bcf_file)
+            write_bcf(result, self.bcf_file, accepted)
         verdicts = {group.verdict for group in comparison.open(groups)}
         finish(assembled is not None and not assembled.passed, verdicts=verdicts)
         if not result.work.pairs:

@@ -10,6 +10,7 @@ from clamp3d.cli.options import CLEARANCE, FOLDER, Method, Source, command, opti
 from clamp3d.cli.terminal import bar, finish, show
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import need
+from clamp3d.output.groups import accepted_file, read_accepted
 
 
 @command("report")
@@ -31,7 +32,7 @@ class Report(Source, Method):
         from clamp3d.output.report import make_report
         from clamp3d.output.report_page import write_report
 
-        settings = self.settings()
+        settings, accepted = self.settings(), read_accepted(accepted_file(self.source))
         check_folder(self.output)
         subject: Assembly | Clamp | Scene = self.load()
         if isinstance(subject, Clamp):
@@ -39,9 +40,10 @@ class Report(Source, Method):
         else:
             self.refuse_method()
         with bar(self.quiet) as report:
-            review = make_report(subject, clearance=self.clearance, progress=report)
+            review = make_report(subject, clearance=self.clearance, accepted=accepted, progress=report)
             paths = write_report(review, self.output, progress=report)
         for path in paths:
             show(str(path))
-        verdicts = {row.verdict for row in (*review.rows, *review.motions)}
+        groups = [f.group for f in review.findings if f.group is not None and f.group.id not in accepted]
+        verdicts = {row.verdict for row in (review.rows if review.assembly else groups)}
         finish(review.assembly is not None and not review.passed, verdicts=verdicts)

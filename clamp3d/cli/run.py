@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from clamp3d import checks
 from clamp3d.clamp.result import Assembly
@@ -102,6 +103,11 @@ class Run(ClampSource, Method, Mechanics, Viewing):
         clamp = self.clamp()
         model = self.model(clamp)
         has_page = self.view or self.html_file is not None or self.url is not None
+        context = click.get_current_context()
+        for param in () if has_page else context.command.params:
+            given = context.get_parameter_source(str(param.name)) is ParameterSource.COMMANDLINE
+            if given and param.name in Viewing.__annotations__:
+                raise click.UsageError(f"{param.opts[-1]} goes with a page: --view, --html or --url")
         try:
             if has_page:
                 result = self.view_assembly(clamp, model, settings, serve=self.view)

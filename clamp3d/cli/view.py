@@ -20,6 +20,7 @@ from clamp3d.engine.check import check
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError, SequenceError
 from clamp3d.output.files import STDOUT
+from clamp3d.output.groups import accepted_file, grouped, read_accepted
 
 if TYPE_CHECKING:
     import trimesh
@@ -169,7 +170,9 @@ class View(Source, Method, Viewing):
             self.refuse_method()
             if self.overlays:
                 raise click.UsageError("--overlay goes with a clamp, not with a scene")
-            finish(verdicts=self.view_scene(loaded, serve=serve).counts)
+            accepted = read_accepted(accepted_file(self.source))  # before the work, for it may be unreadable
+            groups = grouped(self.view_scene(loaded, serve=serve))
+            finish(verdicts={group.verdict for group in groups if group.id not in accepted})
             return
         try:
             run = self.view_assembly(loaded, self.model(loaded), settings, serve=serve)

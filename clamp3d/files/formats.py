@@ -69,6 +69,8 @@ def read(path: Path, option: Any = None) -> Reading:
     form = _ROBOT if kind == ROBOT else FORMATS[kind]
     if form.library is not None:
         need(form.library, kind[1:].upper())
+    if path.is_file() and not path.stat().st_size:
+        raise InputError("the file is empty")
     module, _, function = form.reader.partition(":")
     try:
         reading: Reading = getattr(importlib.import_module(f"clamp3d.files.{module}"), function)(path, option)

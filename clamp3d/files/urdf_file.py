@@ -130,6 +130,13 @@ def _check_whole(root: ElementTree.Element) -> None:
     """Raise InputError for what yourdfpy would pass over, and unless links and joints make one tree."""
     if root.tag != "robot":
         raise InputError(f"not a readable URDF file (it holds <{root.tag}>, not <robot>)")
+    if any("xacro}" in item.tag for item in root.iter()):
+        raise InputError("it holds macros: expand them first (xacro robot.urdf.xacro > robot.urdf)")
+    if root.find("link") is None:
+        raise InputError("no links in the file")
+    for item in root:
+        if item.tag not in ("link", "gazebo") and item.find(".//geometry") is not None:
+            raise InputError(f"not a readable URDF file (a body is in <{item.tag}>, not in <link>)")
     for kind in ("link", "joint"):
         counts = Counter(item.get("name") for item in root.findall(kind))
         for name, count in counts.most_common(1):

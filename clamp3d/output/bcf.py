@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import uuid
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from clamp3d.engine.result import CheckResult
 from clamp3d.output.figures import picture
 from clamp3d.output.files import whole_file
-from clamp3d.output.groups import Group, grouped
+from clamp3d.output.groups import Accepted, Group, grouped
 from clamp3d.output.pages import now, render
 from clamp3d.output.scene_figures import finding_figure, view_of
 from clamp3d.output.wording import group_text, sentence, titles
@@ -23,18 +24,18 @@ _VERSION = b"""<?xml version='1.0' encoding='utf-8'?>
 <Version VersionId="2.1"><DetailedVersion>2.1</DetailedVersion></Version>"""
 
 
-def write_bcf(result: CheckResult, path: Path) -> None:
+def write_bcf(result: CheckResult, path: Path, accepted: Mapping[str, Accepted]) -> None:
     """Write a topic for each group of findings: text, viewpoint, picture, and the parts by their names.
 
     Lengths are metres, as BCF demands. The identifier of a topic follows from that of its group, so that a review tool
-    recognises it in the next file. Raises InputError if the file cannot be written, MissingLibraryError without
-    matplotlib.
+    recognises it in the next file. That of an ``accepted`` group is closed. Raises InputError if the file cannot be
+    written, MissingLibraryError without matplotlib.
     """
     files = {"bcf.version": _VERSION}
     for index, group in enumerate(grouped(result)[:_TOPICS]):
         topic, viewpoint = _guid(group, "topic"), _guid(group, "viewpoint")
         words = _words(result, group) | {"index": index, "topic": topic, "viewpoint": viewpoint}
-        files[f"{topic}/markup.bcf"] = _xml("markup.bcf", **words)
+        files[f"{topic}/markup.bcf"] = _xml("markup.bcf", **words, accepted=accepted.get(group.id))
         files[f"{topic}/viewpoint.bcfv"] = _xml("viewpoint.bcfv", viewpoint=viewpoint, **_camera(result, group))
         files[f"{topic}/snapshot.png"] = picture(finding_figure(result.scene, group.worst), "png")
     content = io.BytesIO()

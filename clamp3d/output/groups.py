@@ -186,10 +186,13 @@ class Accepted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z2-7]{8}", self.id):
-            rule = "id of a finding must be 8 of a-z and 2-7, as check prints it at its end"
+            rule = "id of a finding must be 8 characters of a-z and 2-7, as check prints it at the end of its line"
             raise InputError(f"{rule}, got {shown(self.id)}")
         if not self.why.strip():
             raise InputError(f"why must not be empty, got {shown(self.why)}")
+
+    def __str__(self) -> str:
+        return f"accepted by {self.who} on {self.when} ({self.why})"
 
 
 class _AcceptedFile(msgspec.Struct, forbid_unknown_fields=True):
@@ -205,7 +208,7 @@ def accepted_file(source: str) -> Path:
     'parts/hinge.accepted.toml'
     """
     path = Path(source) if Path(source).name not in ("", "..") else Path(source).resolve()
-    return path.with_name(f"{path.name if path.is_dir() else path.stem}.accepted.toml")
+    return path.parent / f"{path.name if path.is_dir() else path.stem}.accepted.toml"
 
 
 def read_accepted(path: Path) -> dict[str, Accepted]:

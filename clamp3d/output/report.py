@@ -5,7 +5,7 @@ The findings are gathered here, all distances and verdicts from the engine; `rep
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from clamp3d.engine.result import BAD, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.output import assembly_steps
-from clamp3d.output.groups import Group, grouped
+from clamp3d.output.groups import Accepted, Group, grouped
 from clamp3d.output.pages import render
 from clamp3d.output.wording import distance_text, group_text, headline, sentence, titles
 from clamp3d.scenefile.check import opened
@@ -176,9 +176,10 @@ def make_report(
     source: Scene | Assembly,
     *,
     clearance: float | None = None,
+    accepted: Mapping[str, Accepted] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Report:
-    """What `report` writes down.
+    """What `report` writes down; findings of a scene that are ``accepted``, by their identifiers, say so.
 
     >>> from clamp3d.clamp.assemble import assemble
     >>> clamp_report = make_report(assemble())
@@ -191,19 +192,18 @@ def make_report(
         scene = replace(source.scene, clearance=CLEARANCE if clearance is None else clearance)
         return _of_assembly(source, scene)
     scene = source if clearance is None else replace(source, clearance=clearance)
-    return _of_scene(scene, progress)
+    return _of_scene(scene, accepted or {}, progress)
 
 
-def _of_scene(scene: Scene, progress: Callable[[str], None] | None) -> Report:
+def _of_scene(scene: Scene, accepted: Mapping[str, Accepted], progress: Callable[[str], None] | None) -> Report:
     on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
     result = check(scene, progress=on_stage)
-    names = titles(scene)
-    findings = tuple(
-        Finding(_severity(group.verdict), group_text(group, names), PairRow.of(group.worst), group)
-        for group in grouped(result)
-    )
+    names, findings = titles(scene), list[Finding]()
+    for group in grouped(result):
+        text = (f"{accepted[group.id]}: " if group.id in accepted else "") + group_text(group, names)
+        findings.append(Finding(_severity(group.verdict), text, PairRow.of(group.worst), group))
     at_rest, moving = (tuple(map(PairRow.of, rows)) for rows in (result.pairs, result.motions))
-    return Report(scene, headline(result), result.clean, findings, at_rest, moving, result.work.pairs)
+    return Report(scene, headline(result), result.clean, tuple(findings), at_rest, moving, result.work.pairs)
 
 
 def _of_assembly(assembly: Assembly, scene: Scene) -> Report:

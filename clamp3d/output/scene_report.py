@@ -105,7 +105,7 @@ def _findings(result: CheckResult, comparison: Comparison) -> list[str]:
     def line(group: Group) -> str:
         status: str = comparison.status[group.id] if comparison.has_baseline else ""
         if entry := comparison.accepted.get(group.id):
-            status = f"accepted by {entry.who} on {entry.when} ({entry.why})"
+            status = str(entry)
         pairs = comparison.changed.get(group.id, ())
         which = _cut([f"{a} and {b}" for a, b in pairs], _NOTES, "more")
         changed = f"; changed: {', '.join(which)}" if 0 < len(pairs) < len(group.rows) else ""

@@ -79,6 +79,7 @@ def test_a_clamp_that_does_not_close_is_a_finding_and_quiet_says_nothing_on_stde
         (["check", "a.urdf", "--joints", "elbow"], "must read like elbow=1.57,slide=20, got 'elbow'"),
         (["check", "a.urdf", "--joints", "a=1,b=2,a=3"], "must give each joint once, got a 2 times"),
         (["view", "boxes.toml", "--overlay", "wedges"], "--overlay goes with a clamp, not with a scene"),
+        (["run", "--overlay", "wedges"], "--overlay goes with a page: --view, --html or --url"),
         (["view", "--overlay", "spheres"], "wedges[=UNIT_ANGLE_DEG], hulls[=THRESHOLD_MM]"),
         (["view", "--overlay", "wedges=many"], "UNIT_ANGLE_DEG must be a number"),
         (["view", "--url", "http://127.0.0.1:7000/static/"], "(tcp://HOST:PORT), got 'http://127.0.0.1:7000/static/'"),

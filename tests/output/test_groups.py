@@ -7,6 +7,7 @@ import math
 import random
 import re
 import shutil
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -180,6 +181,15 @@ def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main
     assert code == 0
     assert out.count("accepted by Ada on 20") == 2
     assert "no finding now" not in out
+    main("check", "boxes.toml", "--bcf", "a.bcf")
+    with zipfile.ZipFile("a.bcf") as package:
+        topics = [package.read(name) for name in package.namelist() if name.endswith("markup.bcf")]
+    assert [(b'TopicStatus="Closed"' in topic, b"<Description>accepted by Ada on" in topic) for topic in topics] == [
+        (True, True)
+    ] * 2
+    assert main("report", "boxes.toml", "--output", "report")[0] == 0
+    assert (tmp_path / "report/report.html").read_text().count("accepted by Ada on 20") == 2
+    assert main("view", "boxes.toml", "--html", "page.html")[0] == 0
     main("accept", "boxes.toml", "deadbeef", "--why", "a slip of the pen \U0001f600 größe \x07")
     assert "note: accepted, and no finding now: deadbeef" in main("check", "boxes.toml")[1]
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 8})
@@ -199,6 +209,7 @@ def test_folders_whose_names_differ_after_a_point_do_not_share_what_is_accepted(
     (tmp_path / "v1.3" / "sub").mkdir()
     monkeypatch.chdir(tmp_path / "v1.3" / "sub")
     assert main("accept", "..", "abcdefgh", "--why", "so")[0] == 0
+    assert main("check", "/")[0] == 2  # it has no name
     assert {path.name for path in tmp_path.glob("*.toml")} == {"v1.2.accepted.toml", "v1.3.accepted.toml"}
     assert [main("check", source)[0] for source in ("../../v1.2", "..")] == [0, 1]
 
@@ -265,7 +276,7 @@ BAD_ACCEPTED = [
     ('[accepted]\nid = "abcdefgh"', "why: accepted: must be a list, got"),
     ('[[accepted]]\nid = "abcdefgh"', "why: accepted.0.why is missing"),
     ('[[accepted]]\nid = "abcdefgh"\nwhy = " "', "why: accepted.0.why must not be empty, got ' '"),
-    ('[[accepted]]\nid = "zzz"\nwhy = "so"', "why: accepted.0.id of a finding must be 8 of a-z and 2-7"),
+    ('[[accepted]]\nid = "zzz"\nwhy = "so"', "why: accepted.0.id of a finding must be 8 characters of a-z and 2-7"),
     ('[[accepted]]\nid = 5\nwhy = "so"', "why: accepted.0.id: must be a text, got 5"),
     ('[[accepted]]\nid = "abcdefgh"\nwhy = "so"\nx = 1', "why: accepted.0.x is not a known key"),
 ]
@@ -279,8 +290,16 @@ BAD_ACCEPTED = [
         (("check", "boxes.toml", "--baseline", "deep.json"), {"deep.json": "[" * 100_000}, "not a result of `clamp3d"),
         (("check", "boxes.toml"), {"boxes.accepted.toml": "[[accepted]]\nwho = 3"}, "boxes.accepted.toml: must hold"),
         *((("check", "boxes.toml"), {"boxes.accepted.toml": text}, message) for text, message in BAD_ACCEPTED),
-        (("accept", "boxes.toml", "xyz", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
-        (("accept", "boxes.toml", "abcdefg1", "--why", "so"), {}, "id of a finding must be 8 of a-z and 2-7, as check"),
+        (
+            ("accept", "boxes.toml", "xyz", "--why", "so"),
+            {},
+            "id of a finding must be 8 characters of a-z and 2-7, as check",
+        ),
+        (
+            ("accept", "boxes.toml", "abcdefg1", "--why", "so"),
+            {},
+            "id of a finding must be 8 characters of a-z and 2-7, as check",
+        ),
         (("accept", "boxs.toml", "abcdefgh", "--why", "so"), {}, "boxs.toml: no such file or folder"),
         (("accept", "boxes.toml", "00000000"), {}, "Missing option '--why'"),
         (("accept", "boxes.toml", "00000000", "--why", " "), {}, "the reason (--why) must not be empty, got ' '"),

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from clamp3d import Motion, Scene, assemble, check, measure, report, shapes, view
 from clamp3d.clamp.contact import measure_contacts
@@ -203,3 +204,11 @@ def test_every_output_says_the_same(wires, reference_report):
     for row in checked:
         if row["at_least_mm"] is not None:
             assert row["at_least_mm"] <= row["distance_mm"] <= row["at_most_mm"]
+
+
+def test_a_contact_within_bounds_is_short_in_the_matrix_and_a_result_can_be_reported(tmp_path):
+    box = trimesh.creation.box((10, 10, 10))
+    cube = shapes.MeshShape(shapes.make_mesh(box.vertices, box.faces), error=0.004)
+    result = check(Scene().add("a", cube).add("b", shapes.box((10, 10, 10)), translation(0, 0, 10)))
+    page = report(result, tmp_path)[0].read_text()
+    assert "contact<br><small>± 0.004</small>" in page

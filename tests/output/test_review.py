@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,3 +87,13 @@ def test_pandas_and_another_reader_of_bcf_open_the_findings(faulty):
             assert np.abs(at).max() < 0.2  # metres
             assert np.dot(ahead, at) < -0.01  # it looks at the bearing, about the origin
             assert view.snapshot.startswith(b"\x89PNG")
+
+
+def test_a_report_says_what_solids_are_measured_by(faulty):
+    from clamp3d import load, shapes
+    from clamp3d.output.report import make_report
+
+    scene = load(faulty / "bearing.step").add("ball", shapes.sphere(1.0))
+    solids, ball = make_report(replace(scene, parts=scene.parts[-2:])).items("modelled.txt")
+    assert solids.startswith("Shaft: solid with the faces of its CAD file")
+    assert ball.startswith("ball: drawn with true arcs")
