@@ -158,7 +158,9 @@ def _obj_arrays(raw: bytes) -> tuple[Array, IntArray]:
 
 
 def _announced_ply(raw: bytes) -> int:
-    end = max(0, raw.find(b"end_header", 0, 100_000))
+    end = raw.find(b"end_header", 0, 100_000)
+    if end < 0:
+        raise InputError("the file is cut off: its header has no end")
     counts = {name: int(number) for name, number in re.findall(rb"element\s+(\w+)\s+(\d+)", raw[:end])}
     if counts.get(b"tristrips"):
         raise InputError("triangle strips are not read: export it as a list of triangles")

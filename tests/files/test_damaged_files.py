@@ -78,6 +78,7 @@ def refused(path, message, **options):
         ("a.stl", TEXT.replace(b"endfacet", b"", 1), "cut off"),
         ("a.stl", TEXT.replace(b"0.05", b"zero", 1), "not a readable STL file"),
         ("a.stl", TEXT.replace(b"endloop", b"vertex 0 0 0\nendloop", 1), "cut off"),
+        ("a.ply", PLY[:90], "the file is cut off: its header has no end"),
         ("a.ply", PLY, "cut off: 5 lines of vertices and faces are announced, 4 follow"),
         ("a.ply", PLY + b"2 0 1\n", "damaged: it announces 2 faces, 1 were read"),
         ("a.ply", MIXED_PLY, "cut off, or its faces have different numbers of corners: export it as triangles"),
