@@ -1,0 +1,108 @@
+"""What the kernel said at some hundred poses, as it was once recorded: a change of any number is seen.
+
+What it was judged by then is in the other files here. ``python -m tests.kernel.test_recorded`` records it again.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from clamp3d.kernel import (
+    Capsule,
+    Cylinder,
+    Rectangle,
+    SweptArc,
+    arc_circle,
+    groove_pieces,
+    groove_relation,
+    hole_bolt,
+    rotation,
+    signed_distance,
+    translation,
+)
+from clamp3d.kernel.distance import Feature
+from tests.recorded import record_tests
+
+DATA = Path(__file__).with_name("data")
+MIX = np.sqrt(np.arange(2.0, 8.0))
+"""Six numbers in one: a vector's product with these shows each of its terms."""
+UNIT = 2.0**-53
+
+
+def scenes():
+    """Grooves and cylinders of all proportions at poses of all kinds: square, nearly square, oblique, in a face."""
+    rng = np.random.default_rng(12)
+    for k in range(240):
+        R, H, r = 12.0, float(rng.choice([3.0, 20.0, 60.0])), float(rng.choice([0.5, 5.0, 10.5, 14.0]))
+        groove = SweptArc(R, float(rng.choice([0.3, 1.1, 1.5, 1.9, 2.7])), 2.0 * H)
+        wire = (Cylinder, Capsule)[k % 2](r, float(rng.choice([0.7, 6.0, 50.0, 300.0])))
+        axis = np.eye(3)[k % 3] if k % 7 == 0 else rng.normal(size=3)
+        T = rotation(axis, float(rng.choice([0.02, 0.3, 1.3, 2.5])))
+        lip = np.array([R * math.sin(groove.half_angle), -R * math.cos(groove.half_angle), H])
+        about = np.array([(0.0, 0.0, 0.0), lip, (0.0, -R, H), lip * (-1.6, 1.0, -0.5), (2.0, lip[1] - 9.0, 0.0)])[k % 5]
+        T[:3, 3] = about + rng.normal(size=3) * (4.0, 4.0, 6.0) * (1.0 if k % 4 else 0.3)
+        yield groove, wire, T
+
+
+def upright():
+    """The same with the axis along the groove: places in the section, before the ends and in the material."""
+    rng = np.random.default_rng(13)
+    for k in range(60):
+        groove = SweptArc(12.0, (0.4, 1.2, 1.8, 2.8)[k % 4], 40.0)
+        wire = (Cylinder, Capsule)[k // 4 % 2](float(rng.choice([2.0, 7.0])), float(rng.choice([5.0, 60.0])))
+        turn = rotation((1.0, 0.0, 0.0), math.pi) if k % 3 else np.eye(4)
+        x, y, z = rng.uniform(-20.0, 20.0, 3) * (1.0, 1.0, 2.0)
+        yield groove, wire, translation(float(x), float(y), float(z)) @ turn
+
+
+def distances():
+    rows = []
+    for k, (groove, wire, T) in enumerate([*scenes(), *upright()]):
+        a = signed_distance(groove, wire, T)
+        vectors = [a.normal @ MIX[:3], a.point_on_groove @ MIX[:3], a.point_on_cylinder @ MIX[:3], a.gradient @ MIX]
+        relation = groove_relation(groove, wire, T, tolerance=0.3).relation
+        rows.append(
+            [
+                f"{a.feature}, {relation}, {a.axis_inside}, {a.unique if k % 9 == 0 else ''}",
+                a.distance,
+                *vectors,
+                a.along,
+                a.error_bound / UNIT,
+            ]
+        )
+    return rows
+
+
+def pieces():
+    rows = []
+    for groove, wire, T in [*scenes()][::3] + [*upright()][::3]:
+        p = groove_pieces(groove, wire, T)
+        rows.append([str(Feature(code)) for code in p.feature.tolist()] + p.distance.tolist())
+        rows.append([*(p.gradient @ MIX).tolist(), *(p.normal @ MIX[:3] + p.point_on_groove @ MIX[3:]).tolist()])
+    return rows
+
+
+def sections():
+    """Arcs and circles, holes and bolts in the plane, apart and in contact, and what tolerance was applied."""
+    rng, rows = np.random.default_rng(14), []
+    for k in range(120):
+        half, r = float(rng.choice([0.5, 1.4, 2.2])), float(rng.choice([1.0, 5.0, 9.0]))
+        x, y = rng.uniform(-14.0, 14.0, 2).tolist()
+        c = arc_circle(7.0, half, r, x, y, tolerance=(0.0, 0.4)[k % 2])
+        rows.append(
+            [f"{c.relation}, {c.feature}", c.gap, *np.ravel(c.points).tolist(), c.tolerance / UNIT * (k % 2 == 0)]
+        )
+        hole = Rectangle(*rng.uniform(-2.0, 2.0, 2).tolist(), 11.0, (4.0, 15.0)[k % 2], float(rng.uniform(-0.3, 0.3)))
+        bolt = Rectangle(0.5, float(rng.choice([-1.0, 20.0])), 9.0, 12.0, float(rng.uniform(-0.2, 0.2)))
+        h = hole_bolt(hole, bolt, tolerance=(0.0, 0.4)[k % 2])
+        numbers = [h.gap_left, h.gap_right, *h.point, *h.normal, *np.ravel(h.points).tolist()]
+        rows.append([str(h.relation), *(min(x, 1e9) for x in numbers), h.tolerance / UNIT * (k % 2 == 0)])
+    return rows
+
+
+test_answers_are_those_that_were_recorded, record = record_tests(DATA, distances, pieces, sections)
+
+
+if __name__ == "__main__":
+    record()
