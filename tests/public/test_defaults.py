@@ -15,32 +15,27 @@ from clamp3d.geometry import pose
 
 FILE = Path(__file__).with_name("data") / "defaults.json"
 MODULES = (clamp3d, baselines, kernel, shapes, testing, dimensions, placement, tolerance, torque, pose)
-
-
-def arguments(call):
-    return [(p.name, p.default) for p in inspect.signature(call).parameters.values() if p.default is not p.empty]
+PLAIN = (str, int, float, tuple, type(None))
 
 
 def defaults():
-    """Those of functions, methods and fields, by what has them; and the fields by which nothing is compared."""
+    """Those of functions and fields, by what has them; and the fields by which nothing is compared."""
     found = {}
     for thing in [getattr(module, name) for module in MODULES for name in dir(module) if name[0] != "_"]:
-        if not getattr(thing, "__module__", "").startswith("clamp3d"):
+        if inspect.isfunction(thing) and thing.__module__.startswith("clamp3d"):
+            given = [(p.name, p.default) for p in inspect.signature(thing).parameters.values()]
+        elif inspect.isclass(thing) and dataclasses.is_dataclass(thing):
+            fields = dataclasses.fields(thing)
+            given = [(f.name, f.default if f.compare else (f.default, "not compared")) for f in fields]
+        else:
             continue
-        given = arguments(thing) if inspect.isfunction(thing) else []
-        if inspect.isclass(thing):
-            for name, method in inspect.getmembers(thing, inspect.isroutine):
-                plain = getattr(method, "__func__", method)
-                if inspect.isfunction(plain) and name[0] != "_":
-                    given += [(f"{name}: {key}", default) for key, default in arguments(plain)]
-        if dataclasses.is_dataclass(thing):
-            own = dataclasses.fields(thing)
-            given += [(field.name, field.default) for field in own if field.default is not dataclasses.MISSING]
-            given += [(f"{field.name} in comparisons", False) for field in own if not field.compare]
-        if given:
-            plain = (str, int, float, tuple, type(None))
-            words = {key: repr(v) if isinstance(v, plain) else f"a {type(v).__name__}" for key, v in given}
-            found[f"{thing.__module__}.{thing.__qualname__}"] = words
+        absent = (inspect.Parameter.empty, dataclasses.MISSING)
+        plain = {
+            key: repr(v) if isinstance(v, PLAIN) else f"a {type(v).__name__}"
+            for key, v in given
+            if not any(v is a for a in absent)
+        }
+        found |= {f"{thing.__module__}.{thing.__qualname__}": plain} if plain else {}
     return dict(sorted(found.items()))
 
 
