@@ -1,10 +1,8 @@
-"""Outlines, bodies, damaged meshes and motions as they once came out: a change of any number is seen.
+"""Outlines, bodies and damaged meshes as they once came out: a change of any number is seen.
 
 What they were judged by then is in the other files here. ``python -m tests.geometry.test_recorded`` records them again.
 """
 
-import math
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +11,12 @@ import trimesh
 from clamp3d.errors import InputError
 from clamp3d.geometry.mesh import make_mesh
 from clamp3d.geometry.meshing import enclosed, enclosing
-from clamp3d.geometry.motion import Motion
-from clamp3d.geometry.pose import SectionPose, check_pose, nearest_rigid, rotation, unit
-from clamp3d.geometry.shells import volume, winding_numbers
-from clamp3d.geometry.triangles import closest_points, distances_from_segments, halves, quarters
+from clamp3d.geometry.pose import rotation
+from clamp3d.geometry.shells import volume
 from clamp3d.shapes import Hole, SweptArc, box, cylinder, extrusion, groove_block, mesh, sphere
 from tests.geometry.test_shapes import outlines as drawn
 from tests.recorded import record_tests
 
-MIX = np.sqrt(np.arange(2.0, 18.0))
-"""Sixteen numbers in one: a product with these shows each of them."""
 BALL, BLOCK = trimesh.creation.icosphere(1, 2.0), trimesh.creation.box((2.0, 3.0, 4.0))
 
 
@@ -91,53 +85,7 @@ def meshes():
     return rows
 
 
-def motions():
-    rng, rows = np.random.default_rng(9), []
-    for k in range(24):
-        start, to = (rotation(rng.normal(size=3), (0.3, 2.0, 0.0)[(k + j) % 3]) for j in (0, 1))
-        start[:3, 3], to[:3, 3] = rng.normal(size=(2, 3)) * 20.0
-        by = rng.normal(size=3) * 9.0
-        screw = Motion.screw(by, 0.7 * k, point=to[:3, 3], travel=float(k - 5))
-        for motion in (Motion.translate(by), screw, Motion.to_pose(to).resolved(start)):
-            at = [motion.at(t, start).ravel() @ MIX for t in (0.0, 0.3, 1.0, -2.0)]
-            rows.append([*at, motion.speed(to[:3, :3]), *motion.from_axis(start[:3, :3]), motion.is_screw])
-        rough = start.copy()
-        rough[:3, :3] += rng.normal(size=(3, 3)) * 10.0 ** -(3 + k % 3)
-        pose = SectionPose(*by.tolist(), along=2.0)
-        rows.append(
-            [nearest_rigid(rough).ravel() @ MIX, pose.T().ravel() @ MIX, *pose.point(3.0, 4.0), *pose.local(*by[:2])]
-        )
-        rows.append((unit(by * 10.0 ** (40 * k - 300)) if k < 15 else by).tolist())
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always")
-            try:
-                rows.append(check_pose(rough).ravel() @ MIX)
-            except InputError as error:
-                rows.append(str(error))
-        rows.append([str(warning.message) for warning in said])
-    return rows
-
-
-def triangles():
-    """Nearest points of triangles, of some that are lines or points too, and cuts of them."""
-    rng = np.random.default_rng(10)
-    corners, points = rng.normal(size=(60, 3, 3)), 2.0 * rng.normal(size=(60, 3))
-    corners[::6, 2], corners[::12, 1] = corners[::6, 1], corners[::12, 0]
-    edge = rng.integers(0, 3, 60)
-    cut = halves(corners, edge, rng.normal(size=(60, 3))), quarters(corners[:9])
-    found = [
-        closest_points(corners, points),
-        distances_from_segments(points, corners[:, 0], corners[:, 1])[:, None],
-        *cut,
-    ]
-    rows = [(part.reshape(len(part), -1) @ MIX[: part[0].size]).tolist() for part in found]
-    V, F = np.array(BALL.vertices), np.array(BALL.faces)
-    return [*rows, *(winding_numbers(V, F[:count], points[:9]).tolist() for count in (80, 50)), math.log(volume(V, F))]
-
-
-test_geometry_is_as_it_was_recorded, record = record_tests(
-    Path(__file__).with_name("data"), outlines, bodies, meshes, motions, triangles
-)
+test_geometry_is_as_it_was_recorded, record = record_tests(Path(__file__).with_name("data"), outlines, bodies, meshes)
 
 
 if __name__ == "__main__":

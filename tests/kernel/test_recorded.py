@@ -8,18 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clamp3d.kernel import (
-    Capsule,
-    Cylinder,
-    Rectangle,
-    SweptArc,
-    arc_circle,
-    groove_pieces,
-    groove_relation,
-    hole_bolt,
-    rotation,
-    signed_distance,
-)
+from clamp3d import kernel
 from clamp3d.kernel.distance import Feature
 from tests.recorded import record_tests
 
@@ -34,42 +23,33 @@ def scenes():
     rng = np.random.default_rng(12)
     for k in range(300):
         R, H, r = 12.0, float(rng.choice([3.0, 20.0, 60.0])), float(rng.choice([0.5, 5.0, 10.5, 14.0]))
-        groove = SweptArc(R, float(rng.choice([0.3, 1.1, 1.5, 1.9, 2.7])), 2.0 * H)
-        wire = (Cylinder, Capsule)[k % 2](r, float(rng.choice([0.7, 6.0, 50.0, 300.0])))
+        groove = kernel.SweptArc(R, float(rng.choice([0.3, 1.1, 1.5, 1.9, 2.7])), 2.0 * H)
+        wire = (kernel.Cylinder, kernel.Capsule)[k % 2](r, float(rng.choice([0.7, 6.0, 50.0, 300.0])))
         axis = np.eye(3)[k // 3 % 3] if k % 3 == 0 else rng.normal(size=3)
-        T = rotation(axis, float(rng.choice([0.02, 0.3, 1.3, 2.5])))
+        T = kernel.rotation(axis, float(rng.choice([0.02, 0.3, 1.3, 2.5])))
         if k % 5 == 0:
-            T = rotation((1.0, 0.0, 0.0), math.pi * (k % 4 == 1))
+            T = kernel.rotation((1.0, 0.0, 0.0), math.pi * (k % 4 == 1))
         lip = np.array([R * math.sin(groove.half_angle), -R * math.cos(groove.half_angle), H])
-        about = np.array([(0.0, 0.0, 0.0), lip, (0.0, -R, H), lip * (-1.6, 1.0, -0.5), (2.0, lip[1] - 9.0, 0.0)])[
-            k // 7 % 5
-        ]
-        T[:3, 3] = about + rng.normal(size=3) * (4.0, 4.0, 6.0) * (1.0 if k % 4 else 0.3)
+        places = [(0.0, 0.0, 0.0), lip, (0.0, -R, H), lip * (-1.6, 1.0, -0.5), (2.0, lip[1] - 9.0, 0.0)]
+        T[:3, 3] = np.array(places[k // 7 % 5]) + rng.normal(size=3) * (4.0, 4.0, 6.0) * (1.0 if k % 4 else 0.3)
         yield groove, wire, T
 
 
 def distances():
     rows = []
     for k, (groove, wire, T) in enumerate(scenes()):
-        a = signed_distance(groove, wire, T)
+        a = kernel.signed_distance(groove, wire, T)
         vectors = [a.normal @ MIX[:3], a.point_on_groove @ MIX[:3], a.point_on_cylinder @ MIX[:3], a.gradient @ MIX]
-        relation = groove_relation(groove, wire, T, tolerance=0.3).relation
-        rows.append(
-            [
-                f"{a.feature}, {relation}, {a.axis_inside}, {a.unique if k % 9 == 0 else ''}",
-                a.distance,
-                *vectors,
-                a.along,
-                a.error_bound / UNIT,
-            ]
-        )
+        relation = kernel.groove_relation(groove, wire, T, tolerance=0.3).relation
+        words = f"{a.feature}, {relation}, {a.axis_inside}, {a.unique if k % 9 == 0 else ''}"
+        rows.append([words, a.distance, *vectors, a.along, a.error_bound / UNIT])
     return rows
 
 
 def pieces():
     rows = []
     for groove, wire, T in [*scenes()][::4]:
-        p = groove_pieces(groove, wire, T)
+        p = kernel.groove_pieces(groove, wire, T)
         rows.append([str(Feature(code)) for code in p.feature.tolist()] + p.distance.tolist())
         rows.append([*(p.gradient @ MIX).tolist(), *(p.normal @ MIX[:3] + p.point_on_groove @ MIX[3:]).tolist()])
     return rows
@@ -81,13 +61,12 @@ def sections():
     for k in range(120):
         half, r = float(rng.choice([0.5, 1.4, 2.2])), float(rng.choice([1.0, 5.0, 9.0]))
         x, y = rng.uniform(-14.0, 14.0, 2).tolist()
-        c = arc_circle(7.0, half, r, x, y, tolerance=(0.0, 0.4)[k % 2])
-        rows.append(
-            [f"{c.relation}, {c.feature}", c.gap, *np.ravel(c.points).tolist(), c.tolerance / UNIT * (k % 2 == 0)]
-        )
-        hole = Rectangle(*rng.uniform(-2.0, 2.0, 2).tolist(), 11.0, (4.0, 15.0)[k % 2], float(rng.uniform(-0.3, 0.3)))
-        bolt = Rectangle(0.5, float(rng.choice([-1.0, 20.0])), 9.0, 12.0, float(rng.uniform(-0.2, 0.2)))
-        h = hole_bolt(hole, bolt, tolerance=(0.0, 0.4)[k % 2])
+        c = kernel.arc_circle(7.0, half, r, x, y, tolerance=(0.0, 0.4)[k % 2])
+        applied = c.tolerance / UNIT * (k % 2 == 0)
+        rows.append([f"{c.relation}, {c.feature}", c.gap, *np.ravel(c.points).tolist(), applied])
+        u, v, turn, lean = rng.uniform((-2.0, -2.0, -0.3, -0.2), (2.0, 2.0, 0.3, 0.2)).tolist()
+        bolt = kernel.Rectangle(0.5, float(rng.choice([-1.0, 20.0])), 9.0, 12.0, lean)
+        h = kernel.hole_bolt(kernel.Rectangle(u, v, 11.0, (4.0, 15.0)[k % 2], turn), bolt, tolerance=(0.0, 0.4)[k % 2])
         numbers = [h.gap_left, h.gap_right, *h.point, *h.normal, *np.ravel(h.points).tolist()]
         rows.append([str(h.relation), *(min(x, 1e9) for x in numbers), h.tolerance / UNIT * (k % 2 == 0)])
     return rows
