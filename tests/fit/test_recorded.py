@@ -58,6 +58,13 @@ def tube():
     return trimesh.util.concatenate([inside, shell(8.0, np.pi, 24.0, 35, 14)])
 
 
+def pocked():
+    """A scanned bar some of whose corners are further off than its scatter: 5 and 9 times that."""
+    made = scattered(shell(8.0, np.pi, 30.0, 41, 26), 0.01)
+    made.vertices[100:950:17, :2] *= 1.0 + np.where(np.arange(50) % 2, 0.05, 0.09)[:, None] / 8.0
+    return made
+
+
 def beside(*parts):
     """Some parts as one mesh, each 30 mm further on than the one before."""
     return trimesh.util.concatenate([part.apply_translation((30.0 * k, 0.0, 0.0)) for k, part in enumerate(parts)])
@@ -67,10 +74,10 @@ def bars(*sides):
     return [trimesh.creation.cylinder(8.0, 10.0, sections=n) for n in sides]
 
 
-def pieces(arc, by, turn):
-    """Two pieces of one hollow or two: the second one is ``by`` mm on along the axis, and turned about it."""
+def pieces(arc, by, turn, radius=9.0):
+    """Two pieces of one surface or two: the second one is ``by`` mm on along the axis, and turned about it."""
     there = trimesh.transformations.rotation_matrix(turn, (0, 0, 1)) @ trimesh.transformations.translation_matrix(by)
-    both = [shell(9.0, arc, 20.0, 9, 5), shell(9.0, arc, 20.0, 9, 5).apply_transform(there)]
+    both = [shell(9.0, arc, 20.0, 9, 5), shell(radius, arc, 20.0, 9, 5).apply_transform(there)]
     return trimesh.util.concatenate(both)
 
 
@@ -85,6 +92,7 @@ PARTS = {
     "scanned bar": lambda: scattered(shell(8.0, np.pi, 30.0, 41, 16), 0.01),
     "scanned arc": lambda: scattered(shell(12.0, 1.1, 30.0, 25, 18), 0.02),
     "scanned bend": lambda: scattered(shell(40.0, 0.25, 20.0, 17, 15), 0.002),
+    "scanned bar with pocks": pocked,
     "scanned tube": lambda: scattered(tube(), 0.005),
     "six, seven and eight sides": lambda: beside(*bars(6, 7, 8)),
     "cone, ball and ring": lambda: beside(
@@ -94,7 +102,8 @@ PARTS = {
     "pieces end on": lambda: pieces(1.2, (0.0, 0.0, 23.0), 0.0),
     "pieces far apart": lambda: pieces(1.2, (0.0, 0.0, 27.0), 0.0),
     "pieces side by side": lambda: pieces(0.5, (0.0, 0.0, 2.0), 1.05),
-    "pieces of two radii": lambda: beside(shell(9.0, 1.2, 20.0, 9, 5), shell(11.5, 0.6, 20.0, 9, 5)),
+    "pieces of two radii": lambda: pieces(0.5, (0.0, 0.0, 2.0), 1.05, 9.3),
+    "pieces end on of two radii": lambda: pieces(1.2, (0.0, 0.0, 20.5), 0.0, 9.02),
 }
 SOLIDS = ("drilled solid", "solid with other faces")
 
