@@ -3,6 +3,7 @@
 What it was judged by then is in the other files here. ``python -m tests.kernel.test_recorded`` records it again.
 """
 
+import itertools
 import math
 from pathlib import Path
 
@@ -33,6 +34,11 @@ def scenes():
         places = [(0.0, 0.0, 0.0), lip, (0.0, -R, H), lip * (-1.6, 1.0, -0.5), (2.0, lip[1] - 9.0, 0.0)]
         T[:3, 3] = np.array(places[k // 7 % 5]) + rng.normal(size=3) * (4.0, 4.0, 6.0) * (1.0 if k % 4 else 0.3)
         yield groove, wire, T
+    for k, (x, y, z) in enumerate(itertools.product((0.0, 5.0), (0.0, -12.0, -15.0, 4.0), (0.0, 20.0, -22.0))):
+        for axis, r in itertools.product(np.eye(3) * (-1.0) ** k, (2.0, 30.0)):  # square, and on the axes of symmetry
+            T = kernel.translation(x, y, z)
+            T[:3, :3] = np.column_stack([np.roll(axis, 1), np.cross(axis, np.roll(axis, 1)), axis])
+            yield kernel.SweptArc(12.0, 1.3, 40.0), (kernel.Cylinder, kernel.Capsule)[k % 2](r, 9.0), T
 
 
 def distances():
