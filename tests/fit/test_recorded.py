@@ -70,10 +70,6 @@ def beside(*parts):
     return trimesh.util.concatenate([part.apply_translation((30.0 * k, 0.0, 0.0)) for k, part in enumerate(parts)])
 
 
-def bars(*sides):
-    return [trimesh.creation.cylinder(8.0, 10.0, sections=n) for n in sides]
-
-
 def pieces(arc, by, turn, radius=9.0):
     """Two pieces of one surface or two: the second one is ``by`` mm on along the axis, and turned about it."""
     there = trimesh.transformations.rotation_matrix(turn, (0, 0, 1)) @ trimesh.transformations.translation_matrix(by)
@@ -94,11 +90,14 @@ PARTS = {
     "scanned bend": lambda: scattered(shell(40.0, 0.25, 20.0, 17, 15), 0.002),
     "scanned bar with pocks": pocked,
     "scanned tube": lambda: scattered(tube(), 0.005),
-    "six, seven and eight sides": lambda: beside(*bars(6, 7, 8)),
+    "six, seven and eight sides": lambda: beside(*(CREATION.cylinder(8.0, 10.0, sections=n) for n in (6, 7, 8))),
     "cone, ball and ring": lambda: beside(
         CREATION.cone(6.0, 12.0, sections=12), CREATION.icosphere(2), CREATION.torus(9.0, 2.5, 14, 9)
     ),
     "rounded bar": lambda: CREATION.capsule(30.0, 6.0, count=[10, 10]),
+    "bar between cones": lambda: CREATION.revolve([(0, 0), (3, 0), (5, 8), (5, 16), (3, 24), (0, 24)], sections=60),
+    "three facets of 29.5 deg": lambda: shell(9.0, 1.5 * np.radians(29.5), 20.0, 4, 2),
+    "three facets of 30.5 deg": lambda: shell(9.0, 1.5 * np.radians(30.5), 20.0, 4, 2),
     "pieces end on": lambda: pieces(1.2, (0.0, 0.0, 23.0), 0.0),
     "pieces far apart": lambda: pieces(1.2, (0.0, 0.0, 27.0), 0.0),
     "pieces side by side": lambda: pieces(0.5, (0.0, 0.0, 2.0), 1.05),
