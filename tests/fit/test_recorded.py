@@ -58,10 +58,11 @@ def tube():
     return trimesh.util.concatenate([inside, shell(8.0, np.pi, 24.0, 35, 14)])
 
 
-def pocked():
-    """A scanned bar some of whose corners are further off than its scatter: 5 and 9 times that."""
-    made = scattered(shell(8.0, np.pi, 30.0, 41, 26), 0.01)
-    made.vertices[100:950:17, :2] *= 1.0 + np.where(np.arange(50) % 2, 0.05, 0.09)[:, None] / 8.0
+def pocked(columns, rows, *off):
+    """A scanned bar some of whose corners are further off than its scatter."""
+    made = scattered(shell(8.0, np.pi, 30.0, columns, rows), 0.01)
+    few = slice(rows + 3, -rows, 17)
+    made.vertices[few, :2] *= 1.0 + np.resize(off, len(made.vertices[few]))[:, None] / 8.0
     return made
 
 
@@ -88,7 +89,8 @@ PARTS = {
     "scanned bar": lambda: scattered(shell(8.0, np.pi, 30.0, 41, 16), 0.01),
     "scanned arc": lambda: scattered(shell(12.0, 1.1, 30.0, 25, 18), 0.02),
     "scanned bend": lambda: scattered(shell(40.0, 0.25, 20.0, 17, 15), 0.002),
-    "scanned bar with pocks": pocked,
+    "scanned bar with pocks": lambda: pocked(41, 26, 0.09, 0.05),
+    "coarse bar with pocks": lambda: pocked(19, 16, 0.09, 0.14),
     "scanned tube": lambda: scattered(tube(), 0.005),
     "six, seven and eight sides": lambda: beside(*(CREATION.cylinder(8.0, 10.0, sections=n) for n in (6, 7, 8))),
     "cone, ball and ring": lambda: beside(

@@ -46,7 +46,9 @@ def bodies():
             mesh(solid, 0.2),
             *(trimesh.Trimesh(*make(solid, 0.2), process=False) for make in (enclosed, enclosing)),
         )
-        rows.append([*solid.bounds_at(T).ravel(), *(x for made in meshes for x in (made.volume, made.area))])
+        rows.append(
+            [*solid.bounds_at(T).ravel(), *(x for made in meshes for x in (made.volume, made.area, *made.center_mass))]
+        )
     return [*rows, *([ball.error, len(ball.mesh.faces)] for ball in (sphere(3.0), sphere(3.0, mesh_error=0.2)))]
 
 
@@ -85,7 +87,7 @@ def meshes():
     return rows
 
 
-test_geometry_is_as_it_was_recorded, record = record_tests(Path(__file__).with_name("data"), outlines, bodies, meshes)
+test_geometry_is_as_recorded, record = record_tests(Path(__file__).with_name("data"), outlines, bodies, meshes)
 
 
 if __name__ == "__main__":

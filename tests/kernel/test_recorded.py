@@ -13,7 +13,6 @@ from clamp3d import kernel
 from clamp3d.kernel.distance import Feature
 from tests.recorded import record_tests
 
-DATA = Path(__file__).with_name("data")
 MIX = np.sqrt(np.arange(2.0, 8.0))
 """Six numbers in one: a vector's product with these shows each of its terms."""
 UNIT = 2.0**-53
@@ -78,7 +77,7 @@ def sections():
     return rows
 
 
-test_answers_are_those_that_were_recorded, record = record_tests(DATA, distances, pieces, sections)
+test_kernel_is_as_recorded, record = record_tests(Path(__file__).with_name("data"), distances, pieces, sections)
 
 
 if __name__ == "__main__":
