@@ -36,19 +36,13 @@ def outlines():
 def bodies():
     """Boxes around them, turned; and what their meshes hold."""
     T, groove, rows = rotation((1.0, 2.0, 3.0), 0.8), SweptArc(7.0, 1.1, 30.0), []
-    two = [Hole(2.0, (9.0, 4.0)), Hole(1.5, (-8.0, -3.0), "y")]
-    block = groove_block(
-        groove, 60.0, 20.0, others=[(20.0, 4.0, 1.9), (-19.0, 5.0, 0.6)], holes=[Hole(2.0, (12.0, -12.0))]
-    )
-    made = [box(30.0, 20.0, 10.0, holes=two), cylinder(6.0, 14.0, bore=3.5), block]
-    for solid in [*made, extrusion(next(drawn(np.random.default_rng(5), 1)), 7.0)]:
-        meshes = (
-            mesh(solid, 0.2),
-            *(trimesh.Trimesh(*make(solid, 0.2), process=False) for make in (enclosed, enclosing)),
-        )
-        rows.append(
-            [*solid.bounds_at(T).ravel(), *(x for made in meshes for x in (made.volume, made.area, *made.center_mass))]
-        )
+    sides, hole = [(20.0, 4.0, 1.9), (-19.0, 5.0, 0.6)], Hole(2.0, (12.0, -12.0))
+    plate = box(30.0, 20.0, 10.0, holes=[Hole(2.0, (9.0, 4.0)), Hole(1.5, (-8.0, -3.0), "y")])
+    some = [plate, cylinder(6.0, 14.0, bore=3.5), groove_block(groove, 60.0, 20.0, others=sides, holes=[hole])]
+    for solid in [*some, extrusion(next(drawn(np.random.default_rng(5), 1)), 7.0)]:
+        around = [trimesh.Trimesh(*make(solid, 0.2), process=False) for make in (enclosed, enclosing)]
+        held = [(made.volume, made.area, *made.center_mass) for made in (mesh(solid, 0.2), *around)]
+        rows.append([*solid.bounds_at(T).ravel(), *np.ravel(held)])
     return [*rows, *([ball.error, len(ball.mesh.faces)] for ball in (sphere(3.0), sphere(3.0, mesh_error=0.2)))]
 
 
