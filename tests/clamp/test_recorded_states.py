@@ -95,7 +95,7 @@ def ends():
     """Where random clamps end, with and without play, and what holds them there."""
     rows = []
     for k in (20, 22, 23, 28):
-        run = assemble(replace(whole_clamp(np.random.default_rng([41, k])), joints=PLAY if k % 3 else Joints()))
+        run = assemble(replace(whole_clamp(np.random.default_rng([41, k])), joints=PLAY if k % 4 else Joints()))
         row = [run.status, run.distance, run.tilt, run.turns, [str(finding) for finding in run.findings]]
         rows.append([*row, *([f"{f.a}-{f.b} {f.feature}", f.force] for f in run.forces)])
         rows.append([[f"{e.a}-{e.b} {e.relation}", e.travel] for e in run.events])
