@@ -97,7 +97,7 @@ def ends():
     for k in (20, 22, 23, 28):
         run = assemble(replace(whole_clamp(np.random.default_rng([41, k])), joints=PLAY if k % 4 else Joints()))
         row = [run.status, run.distance, run.tilt, run.turns, [str(finding) for finding in run.findings]]
-        rows.append([*row, *([f"{f.a}-{f.b} {f.feature}", f.force] for f in run.forces)])
+        rows.append([*row, *([f"{f.a}-{f.b} {f.feature}", f.force, f.direction @ MIX[:3]] for f in run.forces)])
         rows.append([[f"{e.a}-{e.b} {e.relation}", e.travel] for e in run.events])
     return rows
 
