@@ -1,6 +1,9 @@
 """Answers as they were once recorded: what of them is compared, and where they differ."""
 
+import json
 import math
+
+import pytest
 
 TOLERANCE = 2e-6
 """Processors may differ by that, and the records are rounded to six digits."""
@@ -31,3 +34,23 @@ def differences(new, old, path=""):
     if isinstance(new, float) and isinstance(old, int | float) and math.isclose(new, old, abs_tol=TOLERANCE):
         return []
     return [] if new == old else [f"{path}: {new!r}, recorded {old!r}"]
+
+
+def record_tests(folder, *makes):
+    """A test for each function: it gives what it gave when it was recorded. And a call that records them again."""
+
+    def answer(make):
+        return json.loads(json.dumps(recorded(make()), default=lambda number: number.item()))
+
+    @pytest.mark.parametrize("make", makes, ids=lambda make: make.__name__)
+    def test(make):
+        old = json.loads((folder / f"{make.__name__}.json").read_text(encoding="utf-8"))
+        assert differences(answer(make), old) == []
+
+    def record():
+        folder.mkdir(exist_ok=True)
+        for make in makes:
+            text = json.dumps(answer(make)).replace("], [", "],\n[")
+            (folder / f"{make.__name__}.json").write_text(text + "\n", encoding="utf-8")
+
+    return test, record

@@ -51,6 +51,34 @@ def torn():
     return trimesh.Trimesh(whole.vertices, whole.faces[~((x > 48.7) & (x < 51.0))], process=False)
 
 
+def tube():
+    """The inside and the outside of a tube without its ends."""
+    inside = shell(5.0, np.pi, 24.0, 25, 14)
+    inside.invert()
+    return trimesh.util.concatenate([inside, shell(8.0, np.pi, 24.0, 35, 14)])
+
+
+def pocked(columns, rows, *off):
+    """A scanned bar some of whose corners are further off than its scatter."""
+    made = scattered(shell(8.0, np.pi, 30.0, columns, rows), 0.01)
+    few = slice(rows + 3, -rows, 17)
+    made.vertices[few, :2] *= 1.0 + np.resize(off, len(made.vertices[few]))[:, None] / 8.0
+    return made
+
+
+def beside(*parts):
+    """Some parts as one mesh, each 30 mm further on than the one before."""
+    return trimesh.util.concatenate([part.apply_translation((30.0 * k, 0.0, 0.0)) for k, part in enumerate(parts)])
+
+
+def pieces(arc, by, turn, radius=9.0):
+    """Two pieces of one surface or two: the second one is ``by`` mm on along the axis, and turned about it."""
+    there = trimesh.transformations.rotation_matrix(turn, (0, 0, 1)) @ trimesh.transformations.translation_matrix(by)
+    both = [shell(9.0, arc, 20.0, 9, 5), shell(radius, arc, 20.0, 9, 5).apply_transform(there)]
+    return trimesh.util.concatenate(both)
+
+
+CREATION = trimesh.creation
 PARTS = {
     "splint": lambda: splint(0.3, hole=11.0),
     "splint, strips cut in four": lambda: splint(0.5).subdivide(),
@@ -60,6 +88,23 @@ PARTS = {
     "scanned groove": lambda: trimesh.Trimesh(*scan(2.5, 0.03, 1), process=False),
     "scanned bar": lambda: scattered(shell(8.0, np.pi, 30.0, 41, 16), 0.01),
     "scanned arc": lambda: scattered(shell(12.0, 1.1, 30.0, 25, 18), 0.02),
+    "scanned bend": lambda: scattered(shell(40.0, 0.25, 20.0, 17, 15), 0.002),
+    "scanned bar with pocks": lambda: pocked(41, 26, 0.09, 0.05),
+    "coarse bar with pocks": lambda: pocked(19, 16, 0.09, 0.14),
+    "scanned tube": lambda: scattered(tube(), 0.005),
+    "six, seven and eight sides": lambda: beside(*(CREATION.cylinder(8.0, 10.0, sections=n) for n in (6, 7, 8))),
+    "cone, ball and ring": lambda: beside(
+        CREATION.cone(6.0, 12.0, sections=12), CREATION.icosphere(2), CREATION.torus(9.0, 2.5, 14, 9)
+    ),
+    "rounded bar": lambda: CREATION.capsule(30.0, 6.0, count=[10, 10]),
+    "bar between cones": lambda: CREATION.revolve([(0, 0), (3, 0), (5, 8), (5, 16), (3, 24), (0, 24)], sections=60),
+    "three facets of 29.5 deg": lambda: shell(9.0, 1.5 * np.radians(29.5), 20.0, 4, 2),
+    "three facets of 30.5 deg": lambda: shell(9.0, 1.5 * np.radians(30.5), 20.0, 4, 2),
+    "pieces end on": lambda: pieces(1.2, (0.0, 0.0, 23.0), 0.0),
+    "pieces far apart": lambda: pieces(1.2, (0.0, 0.0, 27.0), 0.0),
+    "pieces side by side": lambda: pieces(0.5, (0.0, 0.0, 2.0), 1.05),
+    "pieces of two radii": lambda: pieces(0.5, (0.0, 0.0, 2.0), 1.05, 9.3),
+    "pieces end on of two radii": lambda: pieces(1.2, (0.0, 0.0, 20.5), 0.0, 9.02),
 }
 SOLIDS = ("drilled solid", "solid with other faces")
 
