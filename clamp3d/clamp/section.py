@@ -289,7 +289,7 @@ class Section:
 
         def velocity(part: PartName, at: Point) -> Array:
             right, below = np.subtract(at, (down.x, down.y)) if part == "P2" else (0.0, 0.0)
-            return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn * (part == "P2")))
+            return np.asarray(twists[_INDEX[part], :2] + np.outer((below, -right), turn))
 
         for k in np.flatnonzero(force):
             row = gaps.rows[k]
