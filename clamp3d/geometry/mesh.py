@@ -206,13 +206,11 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
     bodies = [*solids]
     for corners, triangles in map(arrays_of, surfaces[: len(surfaces) - len(solids)]):
         inside = as_manifold(corners, triangles[:, ::-1])
-        some = sampled(corners)
-        around = (k for k, solid in enumerate(solids) if winding_numbers(*arrays_of(solid), some).mean() > 0.5)
-        k = next(around, None)
+        k = _holder(bodies[: len(solids)], sampled(corners))
         if k is None:
             bodies.append(inside)
             notes.append(f"a body of {len(triangles)} triangles inside out: turned")
-        else:  # a cavity, of the smallest solid round it
+        else:  # a cavity
             bodies[k] -= inside
     if len(bodies) < 2:
         return V, F
@@ -221,6 +219,17 @@ def _united(V: Array, F: IntArray, notes: list[str], *, pinched: bool) -> tuple[
         return V, F
     notes.append(f"{len(bodies)} bodies in the mesh, some of which overlap or touch: taken as one")
     return arrays_of(whole)
+
+
+def _holder(bodies: Sequence[Any], points: Array) -> int | None:
+    """The first of some bodies in which all points (k, 3) are, else that with most of them; None where no half is."""
+    shares = np.zeros(len(bodies))
+    for k, body in enumerate(bodies):
+        if not body.is_empty():
+            shares[k] = (winding_numbers(*arrays_of(body), points) > 0.5).mean()
+        if shares[k] == 1.0:
+            break
+    return int(shares.argmax()) if shares.max(initial=0.0) > 0.5 else None
 
 
 def closed_mesh(vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Mesh:

@@ -153,6 +153,20 @@ def test_corners_of_triangles_are_merged_and_cavities_kept():
     assert len(closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8])).faces) == 24
 
 
+def test_a_void_is_in_the_body_that_holds_all_of_it_and_is_filled_by_those_that_overlap_it():
+    """A body fills most of another one's void; and of two bodies that overlap each has a void, which overlap too."""
+    box = trimesh.creation.box
+    large, small, middle = box((20, 20, 20)), box((11, 14, 14)).apply_translation((-3.5, 0, 0)), box((14, 14, 14))
+    six, four, five = (trimesh.creation.icosphere(3, radius) for radius in (6.0, 4.0, 5.0))
+    for bodies, voids in (([large, small], [six]), ([large, middle], [four.apply_translation((1, 0, 0)), five])):
+        inverted = [trimesh.Trimesh(void.vertices, void.faces[:, ::-1], process=False) for void in voids]
+        whole = trimesh.util.concatenate([*bodies, *inverted])
+        made = make_mesh(whole.vertices, whole.faces)
+        points = np.random.default_rng(1).uniform(-11.0, 11.0, (2000, 3))
+        inside = winding_numbers(whole.vertices, np.asarray(whole.faces), points) > 0.5
+        assert ((winding_numbers(made.vertices, made.faces, points) > 0.5) == inside).all()
+
+
 numbers = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
 
 
