@@ -187,6 +187,15 @@ def test_what_facets_cut_off_a_pin_counts_in_the_bound_by_meshes(monkeypatch):
         assert least <= 0.04 <= most < 0.06
 
 
+def test_a_solid_of_planes_and_cylinders_has_a_closed_form_without_an_error():
+    """Its flat faces are off their triangles only along the hole, which is measured for itself."""
+    plate = cut(block((-20, -20, -5), (20, 20, 5)), rod(8.0, -6, 6))
+    for other, gap in ((block((5, 5, 5.02), (9, 9, 9)), 0.02), (rod(7.9, -9, 9), 0.1)):
+        distance = refine(*models_of(plate, other), np.eye(4), Distance(), lambda d: d.lower > 0.0, cad_forms=True)
+        assert distance.level == "features"
+        assert distance.lower == pytest.approx(gap, abs=1e-9)
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_point_of_coarse_meshes_attests_no_more_than_the_depth(family):
     assert exact_probe(*models(family, -0.06), np.eye(4)).upper >= -0.06
