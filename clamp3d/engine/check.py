@@ -31,8 +31,8 @@ from clamp3d.geometry.pose import Array, inverse
 
 OnRow = Callable[[PairResult], None]
 
-_SAME = 9
-"""Digits (of mm, or of a rotation) to which relative poses agree that one measurement serves."""
+_SAME = np.array([1e13, 1e13, 1e13, 1e9])
+"""To one part in this of a rotation, and of a mm, relative poses agree that one measurement serves."""
 
 
 def check(
@@ -179,7 +179,7 @@ class _Pair(NamedTuple):
     def of(cls, near: NDArray[np.int64], gaps: Array, poses: Array) -> list[_Pair]:
         """Pairs ``near`` (m, 2) of parts at ``poses`` (n, 4, 4), whose boxes keep ``gaps`` (m,)."""
         T = inverse(poses[near[:, 0]]) @ poses[near[:, 1]]
-        places = map(bytes, T[:, :3].round(_SAME) + 0.0)
+        places = map(bytes, (T[:, :3] * _SAME).round() + 0.0)
         return list(map(cls, near[:, 0].tolist(), near[:, 1].tolist(), gaps.tolist(), T, places))
 
 

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from clamp3d.engine.closed_form import Bore, ClosedForm
 from clamp3d.engine.convex import Rod
 from clamp3d.engine.hull import hull
-from clamp3d.engine.surface import Surface
+from clamp3d.engine.surface import SMOOTH, Surface, at_edges
 from clamp3d.fit.features import FitResult, FittedSurface
 from clamp3d.geometry.pose import Array, to_source, to_target, translation
 from clamp3d.geometry.triangles import distances_from_segments
 
 Faces = NDArray[np.int64]
+_AROUND = math.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
+"""Corners (6, 3) of an octahedron that holds the unit ball."""
 
 
 def bodies_of_fit(
@@ -48,12 +50,14 @@ def bodies_of_fit(
             bores.append(bore)
             through[feature.faces] = True
     depth = _FittedDepth(result, model, chord, flat)
-    rods, rest = _rods(result, V, F, through)
-    bodies = [ClosedForm((rod,), tuple(bores), error=error + stated) for rod in rods]
-    points = _outside(result, V, F, chord) if rest else V
+    rods, rest, beyond = _rods(result, V, F, through)
+    bodies = [ClosedForm((rod,), tuple(bores), error=error + stated + beyond) for rod in rods]
+    points, tips = (_outside(result, V, F, chord), _tips(result, V, F, chord)) if rest else (V, np.zeros(0))
+    off = error + stated + max(beyond, depth.bulging)
     for index in rest:
-        off = error + stated + depth.bulging
-        bodies.append(ClosedForm((hull(points[index]),), tuple(bores), error=off, surface=depth))
+        own = index[tips[index] > 0.0]
+        around = np.concatenate([points[index], (V[own, None] + tips[own, None, None] * _AROUND).reshape(-1, 3)])
+        bodies.append(ClosedForm((hull(around),), tuple(bores), error=off, surface=depth))
     return tuple(bodies)
 
 
@@ -70,6 +74,21 @@ def _outside(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
     return points
+
+
+def _tips(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
+    """How far (n,) mm the tips of convex cylinders can be from each vertex, more than their facets' sagitta.
+
+    They are at acute edges, as those of a slanting end.
+    """
+    error, patch = np.zeros(len(F)), np.zeros(len(F), dtype=np.int64)
+    for k, convex in enumerate(result.cylinders, 1):
+        error[convex.faces] = max(convex.chord_error, float(chord[convex.faces].max())) + convex.fit_error
+        patch[convex.faces] = k
+    widened = at_edges(V, F, error, patch, SMOOTH)
+    reach = np.zeros(len(V))
+    np.maximum.at(reach, F.reshape(-1), np.repeat(np.where(widened > error, widened, 0.0), 3))
+    return reach
 
 
 class _FittedDepth:
@@ -178,19 +197,21 @@ def _nearest_to_axis(flat: Array) -> tuple[Array, Array]:
     return np.where(encloses, 0.0, edges.min(axis=1)), edges
 
 
-def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> tuple[list[Rod], list[Faces]]:
+def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> tuple[list[Rod], list[Faces], float]:
     """Stretches along the first full cylinder's axis where the mesh is a round bar, and the vertices of the others.
 
-    ``through`` (m,): the triangles of holes and grooves that are bores of the whole mesh.
+    Last how far (mm) ends stand out of their bars. ``through`` (m,): the triangles of holes and grooves that are bores
+    of the whole mesh.
     """
     full = [f for f in result.cylinders if f.full]
-    everything = [np.unique(F)]
+    everything = [np.unique(F)], 0.0
     if not full:
-        return [], everything
+        return [], *everything
     local = to_source(full[0].T_part_feature, V)
     z, out = local[:, 2], np.hypot(local[:, 0], local[:, 1])
     rods: list[Rod] = []
     taken: list[tuple[float, float]] = []
+    others = ~through
     for feature in full:
         own = np.unique(F[feature.faces])
         low, high = float(z[own].min()), float(z[own].max())
@@ -205,12 +226,18 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
         place = feature.T_part_feature @ translation(0.0, 0.0, 0.5 * float(heights.min() + heights.max()))
         rods.append(Rod(feature.radius, high - low, place))
         taken.append((low, high))
-    rest = []
-    edges = [-math.inf, *(x for span in sorted(taken) for x in span), math.inf]
-    for low, high in zip(edges[0::2], edges[1::2], strict=True):
-        slack = 1e-6 * (1.0 + float(np.ptp(z)))
-        inside = (z[F].min(axis=1) >= low - slack) & (z[F].max(axis=1) <= high + slack)
-        index = np.unique(F[inside])
-        if len(index) and np.ptp(z[index]) > slack:  # a flat face between two stretches is the end of either
+        others[feature.faces] = False
+    if not rods:
+        return [], *everything
+    rest, beyond, flat = [], 0.0, 1e-6 * (1.0 + float(np.ptp(z)))
+    spans = sorted(taken)
+    place = np.searchsorted([0.5 * sum(span) for span in spans], z[F].mean(axis=1))
+    for k in range(len(spans) + 1):
+        index = np.unique(F[others & (place == k)])
+        if len(index) and np.ptp(z[index]) > flat:
             rest.append(index)
-    return (rods, rest) if rods else ([], everything)
+        elif len(index):  # the end of the stretch before or behind it
+            heights = z[index]
+            out_of = [max(float(heights.max()) - b, a - float(heights.min())) for a, b in spans[max(0, k - 1) : k + 1]]
+            beyond = max(beyond, min(out_of))
+    return rods, rest, beyond

@@ -102,7 +102,8 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
     def end(bound: float, reached: float) -> bool:
         return enough(of_thickness(bound)) or not enough(of_thickness(reached))
 
-    return of_thickness(thickness(a, b, T, shared, end, cuts))
+    bound = thickness(a, b, T, shared, end, cuts)
+    return of_thickness(bound) if bound + off >= depth else unbounded
 
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:

@@ -47,6 +47,8 @@ _MOST_FINE = 80_000
 """Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
+_SHARPEST = 0.02
+"""Sine of the sharpest edge at which a round face of a given mesh is looked for beyond its facets, in its box."""
 _FINE_CHORD = 0.005
 """Chord error (mm) of the finer meshes for depths of solids from CAD: half the usual contact threshold."""
 QUICK_TRIANGLES = 15_000
@@ -452,7 +454,11 @@ def _bulge(shape: MeshShape) -> float:
     wide = 2.0 * areas.max(axis=1) / np.maximum(length, 1e-300)
     smooth = (angles > 1e-6) & (angles < np.radians(65.0))
     # A chord w that turns by t has the sagitta w / 2 tan(t / 4).
-    return float((0.5 * wide * np.sin(0.25 * angles) / np.cos(0.25 * angles))[smooth].max(initial=0.0))
+    sagitta = np.where(smooth, 0.5 * wide * np.tan(0.25 * angles), 0.0)
+    bulge, knife = np.zeros(len(F)), angles > 0.5 * np.pi
+    np.maximum.at(bulge, pairs.reshape(-1), np.repeat(sagitta, 2))
+    tips = bulge[pairs[knife]].sum(axis=1) / np.maximum(np.sin(angles[knife]), _SHARPEST)  # as `at_edges` has it
+    return float(max(sagitta.max(initial=0.0), tips.max(initial=0.0)))
 
 
 def box_corners(bounds: Array) -> Array:

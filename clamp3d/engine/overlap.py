@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clamp3d.engine.farthest import End, Pieces, Sheet, farthest
 from clamp3d.engine.surface import Surface
-from clamp3d.geometry.manifolds import arrays_of
+from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.pose import Array, to_source
 from clamp3d.geometry.shells import volume
 from clamp3d.geometry.triangles import normals_and_areas
@@ -101,10 +101,24 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: 
     one body may be swallowed whole, since the surfaces then say nothing of its middle, and of a common part with more
     triangles than it may be cut into.
     """
-    if len(shared.faces) > cuts or 2.0 * shared.volume >= min(float(s.manifold.volume()) for s in (a, b)):
+    if len(shared.faces) > cuts or _may_be_swallowed(a, b, T, shared):
         return np.inf
     triangles = shared.vertices[shared.faces]
     # Those that lie on a surface themselves are no way from it.
     sides = (a, triangles), (b, to_source(T, triangles))
     exact = [(Sheet(surface, np.zeros(len(surface.faces))), pieces) for surface, pieces in sides]
     return farthest([Pieces.of(sheet, pieces, np.zeros(len(pieces))) for sheet, pieces in exact], end, cuts)
+
+
+def _may_be_swallowed(a: Surface, b: Surface, T: Array, shared: Common) -> bool:
+    """Whether half of a body may be in the other mesh, also of one among several of a mesh."""
+    solids = a.manifold, b.manifold.transform(np.ascontiguousarray(T[:3]))
+    if all(len(surface.shell_points) == 1 for surface in (a, b)):
+        return 2.0 * shared.volume >= min(float(solid.volume()) for solid in solids)
+    overlaps = as_manifold(shared.vertices, shared.faces).decompose()
+    bodies = [body for solid in solids for body in solid.decompose()]
+    return any(
+        2.0 * overlap.volume() >= body.volume() and (overlap ^ body).volume() > 0.5 * overlap.volume()
+        for overlap in overlaps
+        for body in bodies
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,7 +12,7 @@ import numpy as np
 
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.pose import Array, to_target
-from clamp3d.geometry.shapes import MeshShape, Shape, Solid
+from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere
 
 if TYPE_CHECKING:
     from clamp3d.engine.scene import Part
@@ -55,8 +56,10 @@ def relation(a: Part, b: Part) -> Relation | None:
     >>> relation(Part("nut", nut, np.eye(4)), Part("bolt", bolt, np.eye(4)))
     Relation(kind='thread', overlap=0.8)
     """
-    if a.shape == b.shape and np.abs(a.T_world - b.T_world).max() <= _COAXIAL:
-        return Relation("duplicate", math.inf)
+    if a.shape == b.shape:
+        moved = to_target(b.T_world, _corners(a.shape)) - to_target(a.T_world, _corners(a.shape))
+        if np.linalg.norm(moved, axis=1).max() <= _COAXIAL:
+            return Relation("duplicate", math.inf)
     fits = [
         (round(pin.radius - hole.radius, 9), pin.radius)
         for p, q in ((a, b), (b, a))
@@ -72,6 +75,13 @@ def relation(a: Part, b: Part) -> Relation | None:
         if low * radius < overlap <= high * radius:
             return Relation(kind, max(0.0, overlap))
     return None
+
+
+def _corners(shape: Shape) -> Array:
+    """Points (k, 3) of which some move at least as far as any point of a shape."""
+    if isinstance(shape, (Solid, Sphere, BrepSolid)):
+        return np.array(list(itertools.product(*shape.bounds_at(np.eye(4)).T)))
+    return shape.mesh.vertices
 
 
 def _stands_in(pin: Array, hole: Array) -> bool:

@@ -45,7 +45,9 @@ def swept_lower(
             rounds = tuple(piece for piece in y.outers if is_angular and not isinstance(piece, Hull))
             bounds += _bounds(replace(y, outers=rounds), x, back, angle)
         best = min(best, max(bounds, default=-np.inf) - x.error - y.error)
-    return float(best)
+    # Where two pieces of a body meet, neither knows how deep a point lies in both together.
+    is_known = best >= 0.0 or len(a.enclosing) == len(b.enclosing) == 1
+    return float(best) if is_known else -np.inf
 
 
 def _bounds(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> Iterator[float]:
