@@ -140,10 +140,11 @@ class _FittedDepth:
         for surface in (*self._result.grooves, *self._result.holes):
             local = to_source(surface.T_part_feature, x)
             cut = np.hypot(local[:, 0], local[:, 1]) < surface.radius - self._slack
-            # At its ends: faces that look out of it, not the floor or the step that it ends at.
-            leaves = (self._model.normals[face] @ surface.T_part_feature[:3, 2]) * np.sign(local[:, 2]) > 1e-6
-            cut &= np.abs(local[:, 2]) < 0.5 * surface.length + np.where(leaves, self._slack, -self._slack)
-            inside |= cut & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) < surface.half_angle)
+            # At its ends: faces that look out of it, not the floor or step that it ends at; a slanting one all along.
+            outward = (self._model.normals[face] @ surface.T_part_feature[:3, 2]) * np.sign(local[:, 2])
+            further = np.where(outward > 1e-6, np.where(outward < 1.0 - 1e-9, np.inf, self._slack), -self._slack)
+            cut &= np.abs(local[:, 2]) < 0.5 * surface.length + further
+            inside |= cut & (np.abs(np.arctan2(local[:, 0], -local[:, 1])) <= surface.half_angle)
         return inside
 
 

@@ -133,3 +133,17 @@ def test_long_bars_that_are_turned_a_little_have_an_answer_of_their_own():
     scene = scene.add("d", bar, translation(0, 10.5, 500) @ rotation((0, 0, 1), turn))
     answer = check(scene, distances=True, pairs=[("a", "b"), ("c", "d")]).pairs[1]
     assert answer.distance.lower - 1e-9 <= 0.5 - 5000.0 * turn <= answer.distance.upper + 1e-9
+
+
+def test_what_facets_leave_of_a_slanting_hole_is_no_material():
+    """A small ball over the end of a hole at 75 degrees, between a chord and the arc: 0.128 mm from the wall."""
+    tilt, axis = math.radians(75.0), np.array([math.sin(math.radians(75.0)), 0.0, math.cos(math.radians(75.0))])
+    drill = Manifold.cylinder(400.0, 5.0, 5.0, 24).translate((0, 0, -200)).rotate((0, 0, 7.5))
+    drill = drill.transform(rotation((0, 1, 0), tilt)[:3])
+    block = manifold_shape(Manifold.cube((160, 40, 20), True) - drill, "round")
+    sagitta = 5.0 * (1.0 - math.cos(math.pi / 24))
+    x = (10.0 * math.sin(tilt) - (5.0 - 0.8 * sagitta)) / math.cos(tilt)
+    below = np.array([x, 0.0, 10.0])
+    assert 5.0 - np.linalg.norm(below - (below @ axis) * axis) == pytest.approx(0.8 * sagitta)
+    answer = distance(block, shapes.sphere(0.01), translation(x, 0.0, 10.03))
+    assert answer.lower <= 0.128 <= answer.upper
