@@ -46,7 +46,7 @@ def swept_lower(
             bounds += _bounds(replace(y, outers=rounds), x, back, angle)
         best = min(best, max(bounds, default=-np.inf) - x.error - y.error)
     # Where two pieces of a body meet, neither knows how deep a point lies in both together.
-    is_known = best >= 0.0 or len(a.enclosing) == len(b.enclosing) == 1
+    is_known = best >= -1e-6 or len(a.enclosing) == len(b.enclosing) == 1
     return float(best) if is_known else -np.inf
 
 
