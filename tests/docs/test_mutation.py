@@ -12,7 +12,12 @@ def names(path: str) -> set[str]:
     """The tests of a file, by its text alone."""
     file = ROOT / path
     tree = ast.parse(file.read_text(encoding="utf-8") if file.exists() else "")
-    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assigned = {n.id for node in tree.body if isinstance(node, ast.Assign) for n in ast.walk(node) if is_target(n)}
+    return assigned | {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def is_target(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
 
 
 def missing(test: str) -> bool:
