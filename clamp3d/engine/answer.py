@@ -15,6 +15,14 @@ import numpy as np
 
 from clamp3d.geometry.pose import Array, to_target
 
+_TOUCHING = 1e-6
+"""Overlap (mm) up to which pieces count as touching: a body that is thinner could be between two of them unseen."""
+
+
+def lower_of_union(least: float) -> float:
+    """Lower bound (mm) of a distance from the ``least`` of those of its pieces: of an overlap there is none."""
+    return least if least >= -_TOUCHING else -math.inf
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distance:
@@ -86,14 +94,17 @@ class Distance:
         return replace(best, lower=max(self.lower, other.lower), normal=normal, level=other.level, method=other.method)
 
     def union(self, other: Distance) -> Distance:
-        """Bounds for the nearer of two pieces."""
+        """Bounds for the nearer of two pieces; none of an overlap from below.
+
+        Where the pieces meet, neither knows how deep a point lies in both together.
+        """
         best, rest = (self, other) if (self.upper, self.lower) <= (other.upper, other.lower) else (other, self)
         unique = best.unique
         if rest.lower <= best.upper + 1e-9:  # the other may be as near, at another place
             unique = None
             if rest.point_a is not None and best.point_a is not None and rest.upper <= best.upper + 1e-9:
                 unique = False if np.abs(rest.point_a - best.point_a).max() > 1e-6 else best.unique
-        return replace(best, lower=min(self.lower, other.lower), unique=unique)
+        return replace(best, lower=lower_of_union(min(self.lower, other.lower)), unique=unique)
 
     def widened(self, error: float) -> Distance:
         """The interval enlarged by ``error`` mm on both sides."""

@@ -27,9 +27,7 @@ _SQUARE = 1e-7
 def rods_distance(mesh: Surface, bodies: tuple[ClosedForm, ...], T: Array) -> Distance:
     """Distance of bodies that a cylinder or ball holds each, at ``T`` (4, 4) in the mesh's frame."""
     distance = reduce(Distance.union, (_rod_distance(mesh, body, T) for body in bodies))
-    # Where two of them meet, neither knows how deep a point lies in both together.
-    lower = distance.lower if distance.lower >= -1e-6 or len(bodies) == 1 else -np.inf
-    return replace(distance, lower=lower, method="cylinder on facets (FCL)")
+    return replace(distance, method="cylinder on facets (FCL)")
 
 
 def rod_of(body: ClosedForm) -> Rod | Ball | None:

@@ -130,8 +130,7 @@ def _nearest_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:
             break
         x, y = pairs[k]
         distance = distance.union(bodies_distance(x, y, T, lambda d: d.upper - d.lower <= 1e-10))
-    # Where two pieces of a body meet, neither knows how deep a point lies in both together.
-    return replace(distance, lower=-np.inf) if distance.lower < -1e-6 else distance
+    return distance
 
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:

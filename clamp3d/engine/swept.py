@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from clamp3d.engine.answer import lower_of_union
 from clamp3d.engine.closed_form import ClosedForm, bore_rod
 from clamp3d.engine.convex import Ball, Convex, Rod, convex_distance
 from clamp3d.engine.hull import Hull, hull
@@ -45,9 +46,8 @@ def swept_lower(
             rounds = tuple(piece for piece in y.outers if is_angular and not isinstance(piece, Hull))
             bounds += _bounds(replace(y, outers=rounds), x, back, angle)
         best = min(best, max(bounds, default=-np.inf) - x.error - y.error)
-    # Where two pieces of a body meet, neither knows how deep a point lies in both together.
-    is_known = best >= -1e-6 or len(a.enclosing) == len(b.enclosing) == 1
-    return float(best) if is_known else -np.inf
+    is_one = len(a.enclosing) == len(b.enclosing) == 1
+    return float(best) if is_one else lower_of_union(float(best))
 
 
 def _bounds(still: ClosedForm, moving: ClosedForm, poses: tuple[Array, ...], angle: float) -> Iterator[float]:
