@@ -52,7 +52,9 @@ def bodies_of_fit(
     depth = _FittedDepth(result, model, chord, flat)
     rods, rest, beyond = _rods(result, V, F, through)
     bodies = [ClosedForm((rod,), tuple(bores), error=error + stated + beyond) for rod in rods]
-    points, tips = (_outside(result, V, F, chord), _tips(result, V, F, chord)) if rest else (V, np.zeros(0))
+    if not rest:
+        return tuple(bodies)
+    points, tips = _outside(result, V, F, chord), _tips(result, V, F, chord)
     off = error + stated + max(beyond, depth.bulging)
     for index in rest:
         own = index[tips[index] > 0.0]
@@ -69,11 +71,16 @@ def _outside(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
         T = convex.T_part_feature
         local = to_source(T, V[own])
         out = np.hypot(local[:, 0], local[:, 1])
-        sagitta = max(convex.chord_error, float(chord[convex.faces].max()))
+        sagitta = _sagitta(convex, chord)
         reach = convex.radius / (1.0 - sagitta / convex.radius) + convex.fit_error
         local[:, :2] *= (np.maximum(reach, out) / out)[:, None]
         points[own] = to_target(T, local)
     return points
+
+
+def _sagitta(convex: FittedSurface, chord: Array) -> float:
+    """How far (mm) a convex cylinder is off its chords, by the fit or by what ``chord`` (m,) says of its triangles."""
+    return max(convex.chord_error, float(chord[convex.faces].max()))
 
 
 def _tips(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
@@ -83,7 +90,7 @@ def _tips(result: FitResult, V: Array, F: Faces, chord: Array) -> Array:
     """
     error, patch = np.zeros(len(F)), np.zeros(len(F), dtype=np.int64)
     for k, convex in enumerate(result.cylinders, 1):
-        error[convex.faces] = max(convex.chord_error, float(chord[convex.faces].max())) + convex.fit_error
+        error[convex.faces] = _sagitta(convex, chord) + convex.fit_error
         patch[convex.faces] = k
     widened = at_edges(V, F, error, patch, SMOOTH)
     reach = np.zeros(len(V))
@@ -232,9 +239,9 @@ def _rods(result: FitResult, V: Array, F: Faces, through: NDArray[np.bool_]) -> 
         return [], *everything
     rest, beyond, flat = [], 0.0, 1e-6 * (1.0 + float(np.ptp(z)))
     spans = sorted(taken)
-    place = np.searchsorted([0.5 * sum(span) for span in spans], z[F].mean(axis=1))
+    between_spans = np.searchsorted([0.5 * sum(span) for span in spans], z[F].mean(axis=1))
     for k in range(len(spans) + 1):
-        index = np.unique(F[others & (place == k)])
+        index = np.unique(F[others & (between_spans == k)])
         if len(index) and np.ptp(z[index]) > flat:
             rest.append(index)
         elif len(index):  # the end of the stretch before or behind it

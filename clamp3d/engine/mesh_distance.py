@@ -81,7 +81,7 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
     rounding = rounding_of(a, b, T)
     if not surfaces_meet(a, b, T):
         lower, upper, p, q = nearest_points(a, b, T)
-        if upper > rounding and not (one_inside(a, b, T) or one_inside(b, a, inverse(T))):
+        if upper > rounding and not one_in_other(a, b, T):
             off = float(a.error_at(p[None])[0] + b.error_at(to_source(T, q)[None])[0])
             return Distance(lower - rounding, upper + off + rounding, p, q)
     off = a.error + b.error + rounding
@@ -114,7 +114,12 @@ def are_apart(a: Surface, b: Surface, T: Array) -> bool:
     gap = tree_distance(a.bvh, b.bvh, T)
     if gap <= rounding or (gap < a.error + b.error + rounding and nearest_points(a, b, T)[0] < rounding):
         return False
-    return not (one_inside(a, b, T) or one_inside(b, a, inverse(T)))
+    return not one_in_other(a, b, T)
+
+
+def one_in_other(a: Surface, b: Surface, T: Array) -> bool:
+    """Whether a shell of a mesh lies in the other one, ``b`` at ``T`` (4, 4) in a's frame; no surfaces may meet."""
+    return one_inside(a, b, T) or one_inside(b, a, inverse(T))
 
 
 def one_inside(outer: Surface, inner: Surface, T: Array) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.mesh_distance import nearest_points, one_inside, rounding_of, surfaces_meet
+from clamp3d.engine.mesh_distance import nearest_points, one_in_other, one_inside, rounding_of, surfaces_meet
 from clamp3d.engine.model import Model
 from clamp3d.engine.surface import Surface, fcl_pair
 from clamp3d.geometry.pose import Array, inverse, to_target
@@ -37,7 +37,7 @@ def open_distance(a: Model, b: Model, T: Array) -> Distance:
 
 def _surface_distance(a: Model, b: Model, T: Array) -> Distance:
     outer_a, outer_b = a.outer(OPEN_ERROR), b.outer(OPEN_ERROR)
-    is_apart = not (surfaces_meet(outer_a, outer_b, T) or _one_in_other(outer_a, outer_b, T))
+    is_apart = not (surfaces_meet(outer_a, outer_b, T) or one_in_other(outer_a, outer_b, T))
     lower = nearest_points(outer_a, outer_b, T)[0] if is_apart else -np.inf
     inner_a, inner_b = a.inner(OPEN_ERROR), b.inner(OPEN_ERROR)
     if inner_a is None or inner_b is None:
@@ -54,11 +54,6 @@ def _surface_distance(a: Model, b: Model, T: Array) -> Distance:
             # In a closed part the other's surface is an overlap; an open one may or may not hold the other part.
             return Distance(-np.inf, (error - upper if closed else upper + error) + rounding)
     return Distance(lower - rounding, upper + error + rounding, p, q)
-
-
-def _one_in_other(a: Surface, b: Surface, T: Array) -> bool:
-    """Whether a mesh seems to wind round the other, ``b`` at ``T`` (4, 4) in a's frame; they may not meet."""
-    return one_inside(a, b, T) or one_inside(b, a, inverse(T))
 
 
 def _crossing(a: Surface, b: Surface, T: Array) -> tuple[float, Array | None]:

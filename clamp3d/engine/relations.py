@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clamp3d.engine.model import box_corners
 from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere
@@ -80,7 +80,7 @@ def relation(a: Part, b: Part) -> Relation | None:
 def _corners(shape: Shape) -> Array:
     """Points (k, 3) of which some move at least as far as any point of a shape."""
     if isinstance(shape, (Solid, Sphere, BrepSolid)):
-        return np.array(list(itertools.product(*shape.bounds_at(np.eye(4)).T)))
+        return box_corners(shape.bounds_at(np.eye(4)))
     return shape.mesh.vertices
 
 
