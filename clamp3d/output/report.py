@@ -16,7 +16,7 @@ from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.result import Assembly
 from clamp3d.engine.check import check
-from clamp3d.engine.result import BAD, PairResult
+from clamp3d.engine.result import BAD, CheckResult, PairResult
 from clamp3d.engine.scene import Scene
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.output import assembly_steps
@@ -139,7 +139,7 @@ def report(
     Parameters
     ----------
     source
-        What to report on: what `check` takes, or an assembly.
+        What to report on: what `check` takes, its result, or an assembly.
     folder : str or Path
         Where report.html, report.json and pairs.csv go; all of them or none.
     clearance : float, optional
@@ -168,12 +168,13 @@ def report(
     from clamp3d.output.report_page import write_report
 
     folder = checked_path("folder", folder)
-    review = make_report(opened(source), clearance=clearance, progress=progress)
+    subject = source if isinstance(source, CheckResult) else opened(source)
+    review = make_report(subject, clearance=clearance, progress=progress)
     return write_report(review, folder, progress=progress or (lambda step: None))
 
 
 def make_report(
-    source: Scene | Assembly,
+    source: Scene | Assembly | CheckResult,
     *,
     clearance: float | None = None,
     accepted: Mapping[str, Accepted] | None = None,
@@ -186,18 +187,21 @@ def make_report(
     >>> len(clamp_report.rows), clamp_report.passed
     (21, True)
     """
-    instance("source", source, Scene, Assembly)
+    instance("source", source, Scene, Assembly, CheckResult)
     function("progress", progress)
     if isinstance(source, Assembly):
         scene = replace(source.scene, clearance=CLEARANCE if clearance is None else clearance)
         return _of_assembly(source, scene)
-    scene = source if clearance is None else replace(source, clearance=clearance)
-    return _of_scene(scene, accepted or {}, progress)
-
-
-def _of_scene(scene: Scene, accepted: Mapping[str, Accepted], progress: Callable[[str], None] | None) -> Report:
+    if isinstance(source, CheckResult) and clearance is None:
+        return _of_result(source, accepted or {})
+    scene = source.scene if isinstance(source, CheckResult) else source
     on_stage = None if progress is None else lambda stage, done, of: progress(f"{stage}: {done} of {of}")
-    result = check(scene, progress=on_stage)
+    scene = scene if clearance is None else replace(scene, clearance=clearance)
+    return _of_result(check(scene, progress=on_stage), accepted or {})
+
+
+def _of_result(result: CheckResult, accepted: Mapping[str, Accepted]) -> Report:
+    scene = result.scene
     names, findings = titles(scene), list[Finding]()
     for group in grouped(result):
         text = (f"{accepted[group.id]}: " if group.id in accepted else "") + group_text(group, names)

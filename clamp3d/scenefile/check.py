@@ -70,13 +70,11 @@ def check(
 
 
 def opened(source: Any) -> Scene | Assembly:
-    """A scene or an assembly as it is, that of a result, or one made of parts or by `load`; a clamp is assembled."""
+    """A scene or an assembly as it is, else made from a list of parts or by `load`; a clamp is assembled."""
     if isinstance(source, (Scene, Assembly)):
         return source
     if isinstance(source, (list, tuple)):
         return Scene(tuple(_part(row) for row in source))
-    if isinstance(source, CheckResult):
-        return source.scene
     loaded = source if isinstance(source, Clamp) else load(source)
     if not isinstance(loaded, Clamp):
         return loaded
