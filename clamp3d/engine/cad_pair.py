@@ -12,6 +12,7 @@ from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.exact import SHARES, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
 from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Model
+from clamp3d.engine.slab import slab_distance
 from clamp3d.errors import Clamp3dError
 from clamp3d.geometry.pose import Array
 
@@ -42,6 +43,9 @@ class CadPair:
         """All levels; ``closed_forms`` come after those that take less time."""
         if self._chords:
             yield "meshes", self._meshes(self._chords[0])
+            slab = slab_distance(self.a, self.b, self.T, self.enough)
+            if slab is not None:
+                yield "boxes", slab
         sections = coaxial_distance(self.a, self.b, self.T, self.enough)
         if sections is not None:
             yield "sections", sections

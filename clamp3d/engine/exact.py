@@ -69,7 +69,7 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
         return nothing
-    points = np.vstack([shared.vertices, shared.inner_points()])
+    points = np.vstack([shared.vertices, shared.inner_points])
     looks = [meshes[0].distance(points), meshes[1].distance(to_source(T, points))]
     orders = [np.argsort(-look, kind="stable")[:points_each] for look in (np.minimum(*looks), np.maximum(*looks))]
     points = points[np.concatenate(orders)]

@@ -167,7 +167,7 @@ def within(inner: Surface, outer: Surface, T: Array, slack: float) -> bool:
     corners, faces = arrays_of(inner.manifold.transform(np.ascontiguousarray(T[:3])) - outer.manifold)
     # What fills a hole of the other may have all its corners on the hole's rim, but not the middles of its triangles;
     # what fills a void has these on its walls too, but not what is inside.
-    beneath = Common(corners, faces).inner_points() if len(faces) else corners
+    beneath = Common(corners, faces).inner_points if len(faces) else corners
     return bool((outer.distance(np.vstack([corners, corners[faces].mean(axis=1), beneath])) <= slack).all())
 
 

@@ -44,6 +44,7 @@ class Common(Surface):
         """The middles (k, 3) of the largest triangles: corners may lie where both bodies end."""
         return np.asarray(self.vertices[self.faces[self._largest]].mean(axis=1))
 
+    @cached_property
     def inner_points(self) -> Array:
         """Points (k, 3) under the middles of the largest triangles, as deep as the part is thick on average."""
         normal, area = self.areas
@@ -74,9 +75,12 @@ class Common(Surface):
 
 def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
-    intersection = a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3]))
-    vertices, faces = arrays_of(intersection)
-    return Common(vertices, faces) if len(faces) else None
+    asked = (b, T.tobytes())
+    if a.last_common is None or a.last_common[0] != asked:  # a pair's levels ask for the same one after the other
+        vertices, faces = arrays_of(a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3])))
+        a.last_common = asked, Common(vertices, faces) if len(faces) else None
+    part: Common | None = a.last_common[1]
+    return part
 
 
 def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Array]:
@@ -88,7 +92,7 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
     Negative: nothing is certain.
     """
     corners = shared.vertices[:: max(1, len(shared.vertices) // _CORNERS)]
-    points = np.vstack([corners, shared.middles(), shared.inner_points()])
+    points = np.vstack([corners, shared.middles(), shared.inner_points])
     depth = np.maximum(a.distance(points), b.distance(to_source(T, points))) - a.error - b.error
     k = int(np.argmax(depth))
     return float(depth[k]), points[k]
@@ -115,8 +119,10 @@ def _may_be_swallowed(a: Surface, b: Surface, T: Array, shared: Common) -> bool:
     solids = a.manifold, b.manifold.transform(np.ascontiguousarray(T[:3]))
     if all(len(surface.shell_points) == 1 for surface in (a, b)):
         return 2.0 * shared.volume >= min(float(solid.volume()) for solid in solids)
-    overlaps = as_manifold(shared.vertices, shared.faces).decompose()
     bodies = [body for solid in solids for body in solid.decompose()]
+    if 2.0 * shared.volume < min(float(body.volume()) for body in bodies):
+        return False
+    overlaps = as_manifold(shared.vertices, shared.faces).decompose()
     return any(
         2.0 * overlap.volume() >= body.volume() and (overlap ^ body).volume() > 0.5 * overlap.volume()
         for overlap in overlaps

@@ -44,6 +44,8 @@ class Surface:
     faces: NDArray[np.int64]
     face_error: Array | None = None
     is_simple: bool = True
+    last_common: Any = None
+    """The mesh and the pose of the last common part that was made with this one, and that part (`overlap.common`)."""
 
     def __post_init__(self) -> None:
         self.vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
@@ -53,6 +55,11 @@ class Surface:
     def error(self) -> float:
         """Largest error of a triangle, mm."""
         return 0.0 if self.face_error is None else float(self.face_error.max(initial=0.0))
+
+    @property
+    def face_errors(self) -> Array:
+        """The errors (m,) of its triangles, mm."""
+        return np.zeros(len(self.faces)) if self.face_error is None else self.face_error
 
     @cached_property
     def scale(self) -> float:
@@ -241,6 +248,12 @@ class Surface:
         meet = np.full(len(triangles), len(result.contacts) >= most)  # then some may be missing
         meet[[contact.b1 for contact in result.contacts]] = True
         return meet
+
+    def rows_near(self, box: Array, margin: float) -> NDArray[np.int64]:
+        """The triangles (k,) whose true surface may be within ``margin`` mm of a box (2, 3)."""
+        corners, off = self.vertices[self.faces], margin + self.face_errors[:, None]
+        above = (corners.max(axis=1) + off >= box[0]).all(axis=1)
+        return np.flatnonzero(above & (corners.min(axis=1) - off <= box[1]).all(axis=1))
 
     def error_at(self, points: Array) -> Array:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""

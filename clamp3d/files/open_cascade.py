@@ -139,6 +139,11 @@ def bounds_at(brep: bytes, T: Array) -> Array:
     return bounds_of(moved(from_bytes(brep), T))
 
 
+def face_bounds_at(brep: bytes, T: Array) -> Array:
+    """Boxes (n, 2, 3) along the target's axes of the faces of a solid placed by ``T`` (4, 4), mm."""
+    return np.array([bounds_of(face) for face in explore(moved(from_bytes(brep), T), "FACE")])
+
+
 def moved(shape: Any, T: Array) -> Any:
     """A TopoDS_Shape placed by ``T`` (4, 4)."""
     return shape.Moved(location(T))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.files import cad_process
-from clamp3d.files.faces import Surfaces
+from clamp3d.files.faces import OTHER, Surfaces
 from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
 from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
@@ -38,11 +38,12 @@ class BrepSolid(MeshShape):
         for key, value in (("name", name), ("fit", "off")):
             object.__setattr__(self, key, value)
         self.__dict__.update(brep=brep, bounds=np.asarray(bounds, dtype=np.float64))
-        self.__dict__["_tessellations"] = {}
+        self.__dict__.update(_tessellations={}, _tops={})
 
     brep: bytes
     bounds: Array
     _tessellations: dict[float, Tessellation]
+    _tops: dict[tuple[float, ...], Array]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.name, self.brep, self.bounds)
@@ -74,6 +75,16 @@ class BrepSolid(MeshShape):
             make = cad_process.tessellate if chord >= CHORD else cad_process.tessellate_finely
             self._tessellations[chord] = make(self.brep, chord)
         return self._tessellations[chord]
+
+    def tops(self, direction: Array) -> Array:
+        """How high (n,) mm each face reaches along a unit vector (3,); infinite for splines, which is not certain."""
+        key = tuple(direction.round(12).tolist())
+        if key not in self._tops:
+            frame = np.eye(4)
+            frame[:2, :3], frame[2, :3] = np.linalg.svd(direction[None])[2][1:], direction
+            tops = cad_process.face_bounds_at(self.brep, frame)[:, 1, 2]
+            self._tops[key] = np.where(self.surfaces.kind == OTHER, np.inf, tops)
+        return self._tops[key]
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -40,6 +40,8 @@ _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
 """About how many places of a spline are looked at besides those of each triangle."""
+_DIGITS = 9
+"""Decimals (mm) to which points are one vertex."""
 _EDGE = 1e-9
 """How far beside a triangle, relative to it, a place is still in it: none falls between two."""
 
@@ -94,10 +96,10 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
         errors.append(np.maximum(deviation, border_sag(face, points, triangles)))
     if not corners:
         raise Clamp3dError("Open CASCADE makes no triangles of it")
-    # Faces that share an edge have the same points on it, so equal coordinates are one vertex.
+    # Faces that share an edge have the same points on it, but for rounding where each has a place of its own.
     points, triangles = appended(corners, triples)
-    vertices, index = np.unique(points, axis=0, return_inverse=True)
-    F = index.reshape(-1)[triangles]
+    _, first, index = np.unique(points.round(_DIGITS), axis=0, return_index=True, return_inverse=True)
+    vertices, F = points[first], index.reshape(-1)[triangles]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 

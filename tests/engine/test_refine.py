@@ -85,6 +85,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
     monkeypatch.setattr(cad_pair, "meshes_distance", meshes)
+    monkeypatch.setattr(cad_pair, "slab_distance", lambda *_: Distance(method="slab"))
     monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: Distance(method="sections"))
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
@@ -103,7 +104,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
             SimpleNamespace(exact=1, is_simple=True, chords=chords, quick_bodies=(1,), fine_triangles=triangles)
             for chords in (first, second)
         )
-        coarse, fine = ["0.1 []"] * bool(first), ["0.0018 []"] * (first == second == both)
+        coarse, fine = ["0.1 []", "slab"] * bool(first), ["0.0018 []"] * (first == second == both)
         place = 2 if triangles != 7_500 else 0 if deep <= 1e-4 else 1
         soon, later, last = (fine * (k == place) for k in range(3))
         order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]

@@ -13,7 +13,9 @@ from clamp3d import Verdict, check, load
 from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
+from clamp3d.files.solid import BrepSolid
 from clamp3d.files.tessellation import _deviation, border_sag, tessellate, triangles_of
+from clamp3d.geometry.mesh import is_closed
 from tests.cad import (
     array_of,
     ball,
@@ -30,7 +32,7 @@ from tests.cad import (
     turn,
 )
 from tests.files.assemblies import write_step
-from tests.public.placed_pairs import arch
+from tests.public.placed_pairs import arch, placed_pair
 
 SOLIDS = {
     "drilled": (cut(block((-9, -9, 0), (9, 9, 4)), rod(3, -1, 5)), {PLANE, CYLINDER}),
@@ -275,3 +277,11 @@ def test_planes_are_planes_however_their_splines_are_turned(far):
         corners = np.array([occ.BRep_Tool.Pnt_s(vertex).Coord() for vertex in explore(solid, "VERTEX")])
         for kind, frame, size in zip(form.kind, form.frame, form.size, strict=True):
             assert (np.abs(height(kind, frame, size, corners)) <= 1e-7).sum() == 4 * 6  # each of 8 is met 6 times
+
+
+def test_faces_with_places_of_their_own_make_a_closed_mesh():
+    """The ends of a prism are one face at two places; moved once more, its corners differ in the last digits."""
+    rng = np.random.default_rng(6)
+    for _ in range(8):
+        hexagon = moved(placed_pair("hexagon_in_bore", rng, 0.03, splines=0.0).b, random_pose(rng))
+        assert is_closed(BrepSolid.of(first_solid(hexagon), "hexagon").tessellated(0.1).faces)
