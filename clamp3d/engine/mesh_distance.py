@@ -84,26 +84,43 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
         if upper > rounding and not one_in_other(a, b, T):
             off = float(a.error_at(p[None])[0] + b.error_at(to_source(T, q)[None])[0])
             return Distance(lower - rounding, upper + off + rounding, p, q)
-    off = a.error + b.error + rounding
     shared = common(a, b, T)
     if shared is None:
+        off = errors_nearby(a, b, T) + rounding
         return Distance(-off, off)
     depth, point = deepest(a, b, T, shared)
     upper = rounding - depth
 
-    def of_thickness(bound: float) -> Distance:
-        return Distance(-bound - off, max(upper, -bound - off), point, point)
+    def bounded(overlap: float) -> Distance:
+        return Distance(-overlap - rounding, max(upper, -overlap - rounding), point, point)
 
     unbounded = Distance(-np.inf, upper, point, point)
-    of_meshes = depth + a.error + b.error  # what was measured there: no bound of the meshes' overlap is less
-    if enough(unbounded) or not enough(of_thickness(max(0.0, of_meshes))):
+    measured = max(0.0, depth + a.error + b.error)  # of the meshes, there: no bound is less
+    if enough(unbounded) or not enough(bounded(measured)):
+        return unbounded
+    off = errors_nearby(a, b, T)
+    if not enough(bounded(max(measured, off))):
         return unbounded
 
     def end(bound: float, reached: float) -> bool:
-        return enough(of_thickness(bound)) or not enough(of_thickness(reached))
+        return enough(bounded(max(bound, off))) or not enough(bounded(max(reached, off)))
 
-    bound = thickness(a, b, T, shared, end, cuts)
-    return of_thickness(bound) if bound + off >= depth else unbounded
+    bound = max(off, thickness(a, b, T, shared, end, cuts))
+    return bounded(bound) if bound + rounding >= depth else unbounded
+
+
+def errors_nearby(a: Surface, b: Surface, T: Array) -> float:
+    """The largest sum (mm) of the errors of a triangle of each mesh that are no further apart than that.
+
+    Lemma: where the meshes do not overlap, the true bodies overlap by no more: a point of both is within each
+    triangle's error of it.
+    """
+    groups = [(e + f, first, second) for first, e in a.fine_groups for second, f in b.fine_groups]
+    near = rounding_of(a, b, T)
+    for total, first, second in sorted(groups, key=lambda group: -group[0]):
+        if tree_distance(first, second, T) <= total + near:
+            return total
+    return 0.0
 
 
 def are_apart(a: Surface, b: Surface, T: Array) -> bool:

@@ -99,19 +99,24 @@ def deepest(a: Surface, b: Surface, T: Array, shared: Common) -> tuple[float, Ar
 
 
 def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: int) -> float:
-    """Upper bound (mm) of how deep any point of one mesh's surface lies in the other.
+    """Upper bound (mm) of how deep what one mesh's triangles in the other stand for can lie in the true other body.
 
-    It is sharpened until ``end``, of the bound and of a depth that a point has, or ``cuts`` are made. Infinite where
+    It is sharpened until ``end``, of the bound and of what none can be less than, or ``cuts`` are made. Infinite where
     one body may be swallowed whole, since the surfaces then say nothing of its middle, and of a common part with more
     triangles than it may be cut into.
     """
     if len(shared.faces) > cuts or _may_be_swallowed(a, b, T, shared):
         return np.inf
     triangles = shared.vertices[shared.faces]
-    # Those that lie on a surface themselves are no way from it.
-    sides = (a, triangles), (b, to_source(T, triangles))
-    exact = [(Sheet(surface, np.zeros(len(surface.faces))), pieces) for surface, pieces in sides]
-    return farthest([Pieces.of(sheet, pieces, np.zeros(len(pieces))) for sheet, pieces in exact], end, cuts)
+    sides = [(a, triangles), (b, to_source(T, triangles))]
+    places = [(surface, pieces.mean(axis=1)) for surface, pieces in sides]
+    is_on = [surface.distance(middles) <= 1e-9 * surface.scale for surface, middles in places]
+    errors = [surface.error_at(middles) for surface, middles in places]
+    every = []
+    for (surface, pieces), own, other in zip(sides, (0, 1), (1, 0), strict=True):
+        rows = is_on[other] | ~is_on[own]  # those that lie on this surface alone are no way from it
+        every.append(Pieces.of(Sheet(surface, surface.face_errors), pieces[rows], errors[other][rows]))
+    return farthest(every, end, cuts)
 
 
 def _may_be_swallowed(a: Surface, b: Surface, T: Array, shared: Common) -> bool:

@@ -21,6 +21,8 @@ from clamp3d.geometry.triangles import edge_middles, halves, normals_and_areas
 
 _LEVELS = 4
 """Groups that the triangles with errors are put in at most, each four times finer than the one before."""
+_FINE_LEVELS = 12
+"""The same, each 1.5 times finer: the last holds errors of up to a hundredth of the largest."""
 TURN = rotation((3.0, 4.0, 5.0), 1e-13)
 """By so much, which is less than is rounded, one of two meshes is turned before FCL measures their distance.
 
@@ -79,11 +81,20 @@ class Surface:
     @cached_property
     def groups(self) -> tuple[tuple[Any, float], ...]:
         """Triangles by their error: (FCL's tree, largest error in mm), the exact ones first."""
+        return self._by_error(_LEVELS, 4.0)
+
+    @cached_property
+    def fine_groups(self) -> tuple[tuple[Any, float], ...]:
+        """The same with errors that are more alike."""
+        return self._by_error(_FINE_LEVELS, 1.5)
+
+    def _by_error(self, levels: int, ratio: float) -> tuple[tuple[Any, float], ...]:
         if self.face_error is None or self.error == 0.0:
             return ((self.bvh, 0.0),)
-        level = np.full(len(self.faces), _LEVELS)
+        level = np.full(len(self.faces), levels)
         off = self.face_error > 0.0
-        level[off] = np.minimum(np.log2(self.error / self.face_error[off]) // 2.0, _LEVELS - 1).astype(int)
+        steps = np.log(self.error / self.face_error[off]) / np.log(ratio)
+        level[off] = np.minimum(steps, levels - 1).astype(int)
         places = sorted(set(level.tolist()), reverse=True)
         if len(places) == 1:
             return ((self.bvh, self.error),)
