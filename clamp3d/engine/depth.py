@@ -16,9 +16,9 @@ from clamp3d.engine.answer import Distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.exact import SHARES, attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
-from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, rounding_of
+from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, greatest_overlap, rounding_of
 from clamp3d.engine.model import QUICK_TRIANGLES, Model
-from clamp3d.engine.overlap import Common, common, deepest, thickness
+from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.refine import from_boxes, refine
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
@@ -252,8 +252,8 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, 
         own = exact_probe(a, b, meshes.T)
         if thorough or a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES:
             *_, meshes = _overlapping_meshes(a, b, meshes.T, thorough)
-    most = thickness(meshes.a, meshes.b, meshes.T, meshes.shared, _is_sharp, FEW_CUTS)
-    return replace(own, lower=-meshes.hidden - most, method="")
+    most = greatest_overlap(meshes.a, meshes.b, meshes.T, meshes.shared, _is_sharp, FEW_CUTS)
+    return replace(own, lower=-most - rounding_of(meshes.a, meshes.b, meshes.T), method="")
 
 
 def _is_sharp(bound: float, reached: float) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
+from clamp3d.engine.farthest import End
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
 from clamp3d.engine.surface import TURN, Surface, fcl_pair, tree_distance
@@ -98,15 +99,23 @@ def surface_distance(a: Surface, b: Surface, T: Array, enough: Enough, cuts: int
     measured = max(0.0, depth + a.error + b.error)  # of the meshes, there: no bound is less
     if enough(unbounded) or not enough(bounded(measured)):
         return unbounded
-    off = errors_nearby(a, b, T)
-    if not enough(bounded(max(measured, off))):
-        return unbounded
 
     def end(bound: float, reached: float) -> bool:
-        return enough(bounded(max(bound, off))) or not enough(bounded(max(reached, off)))
+        return enough(bounded(bound)) or not enough(bounded(max(measured, reached)))
 
-    bound = max(off, thickness(a, b, T, shared, end, cuts))
+    bound = greatest_overlap(a, b, T, shared, end, cuts)
     return bounded(bound) if bound + rounding >= depth else unbounded
+
+
+def greatest_overlap(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: int) -> float:
+    """Upper bound (mm) of how deep a point of one true body lies in the other, from their meshes' common part.
+
+    It is sharpened as `thickness` is, unless it cannot be enough for the ``end`` at all.
+    """
+    off = errors_nearby(a, b, T)
+    if off > 0.0 and end(np.inf, off):
+        return np.inf
+    return max(off, thickness(a, b, T, shared, lambda bound, least: end(max(bound, off), max(least, off)), cuts))
 
 
 def errors_nearby(a: Surface, b: Surface, T: Array) -> float:

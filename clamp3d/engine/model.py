@@ -19,7 +19,7 @@ from clamp3d.engine.convex import Ball, Rod
 from clamp3d.engine.drawn import bodies_of
 from clamp3d.engine.hull import Hull, hull, hull_error
 from clamp3d.engine.near_faces import FaceMeshes
-from clamp3d.engine.surface import SMOOTH, Surface, at_edges
+from clamp3d.engine.surface import Surface, at_edges
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE
@@ -330,8 +330,7 @@ class CadModel(Model):
         mesh = self.shape.tessellated(chord)
         if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
             raise Clamp3dError(f"the triangles of {self.name} do not close")
-        errors = at_edges(mesh.vertices, mesh.faces, mesh.errors, mesh.face, SMOOTH)
-        return Surface(mesh.vertices, mesh.faces, errors)
+        return Surface(mesh.vertices, mesh.faces, mesh.errors)
 
 
 class MeshModel(Model):
