@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from clamp3d.engine.answer import Distance
+from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.exact import SHARES, attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
@@ -246,6 +247,9 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, 
         def end(bounds: Distance, closest: Distance) -> bool:
             return bounds.lower >= (_SHARPER if thorough else _SHARP) * closest.lower
 
+        sections = coaxial_distance(a, b, meshes.T, lambda distance: end(distance, Distance(distance.upper)))
+        if sections is not None and np.isfinite(sections.lower):
+            return sections
         own = exact_overlap(a, b, meshes.T, SHARES[1], end=end, attested=depth)
         if np.isfinite(own.lower):
             return own

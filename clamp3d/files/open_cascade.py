@@ -18,7 +18,7 @@ from clamp3d.geometry.pose import Array
 TOLERANCE = 1e-6
 """Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
 _ADAPTIVE = 1e-6
-"""Relative accuracy (1) that the second of two integrations is asked for."""
+"""Relative accuracy (1) that an adaptive integration is asked for."""
 
 
 class _OpenCascade:
@@ -123,9 +123,9 @@ def volumes_of(shape: Any) -> tuple[float, float]:
     return low, high
 
 
-def area_of(shape: Any) -> float:
-    """Area of the faces of a TopoDS_Shape, mm^2."""
-    return _integral(shape, "SurfaceProperties_s")
+def area_of(shape: Any, *, adaptive: bool = False) -> float:
+    """Area of the faces of a TopoDS_Shape, mm^2; within splines it can be 1e-4 off, unless it is ``adaptive``."""
+    return _integral(shape, "SurfaceProperties_s", *[_ADAPTIVE] * adaptive)
 
 
 def _integral(shape: Any, function: str, *accuracy: float) -> float:

@@ -106,7 +106,7 @@ def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
     for angle in _ANGLES:
         cut = _cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND)
         loops = tuple(_loop(wire, angle, circles) for wire in explore(cut, "WIRE"))
-        sections.append((loops, area_of(cut)))
+        sections.append((loops, area_of(cut, adaptive=True)))
     (loops, area), (others, _) = sections
     lost = CHORD * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops)
     is_whole = area > 0.0 and abs(_area(loops) - area) <= lost + _APPROXIMATE * area
