@@ -14,6 +14,7 @@ from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
 from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Model
 from clamp3d.engine.slab import slab_distance
 from clamp3d.errors import Clamp3dError
+from clamp3d.files.faces import SPHERE
 from clamp3d.geometry.pose import Array
 
 Levels = Iterator[tuple[str, Distance]]
@@ -65,6 +66,8 @@ class CadPair:
         probe = exact_probe(self.a, self.b, self.T)
         yield "exact", probe
         self._attested = -probe.upper
+        if probe.upper < 0.0 and not (_may_be_ball(self.a) or _may_be_ball(self.b)):
+            return  # they overlap: of other bodies than balls Open CASCADE would say 0
         distance = exact_distance(self.a, self.b, self.T)
         unproven = replace(distance, lower=-np.inf)
         if distance.lower > probe.upper:  # a point lies in both solids
@@ -121,3 +124,9 @@ class CadPair:
             return meshes_distance(self.a, self.b, self.T, chord, self.enough, thorough=thorough, cuts=cuts)
         except Clamp3dError:
             return Distance(method="without fine meshes")
+
+
+def _may_be_ball(model: Model) -> bool:
+    """Whether all faces of a solid are spherical, so that Open CASCADE's distance may be signed."""
+    assert model.exact is not None
+    return bool((model.exact.surfaces.kind == SPHERE).all())

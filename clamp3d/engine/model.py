@@ -59,8 +59,8 @@ DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 CAD_CHORDS = (0.1, 0.0018)
 """Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
 
-Of two equal cylinders, one in the other, facets overlap by a chord error, and at an edge each adds its own twice: five
-fine ones are less than the usual threshold of contact, 0.01 mm.
+Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are
+less than the usual threshold of contact, 0.01 mm, with some to spare for splines.
 """
 
 Forms = tuple[ClosedForm, ...]

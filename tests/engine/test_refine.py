@@ -91,7 +91,8 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    begin, both = ["sections", "probe", "distance"], (0.1, 0.0018)
+    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
+    begin, both = ["sections", "probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for first, second, triangles, end in (
@@ -119,6 +120,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     monkeypatch.setattr(cad_pair, "meshes_distance", fails)
     monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
+    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
@@ -128,8 +130,8 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
-    assert [answer.method for answer in answers[:4]] == ["probe", "distance", "0.04", "0.04"]
-    assert len(answers) == 5
+    assert [answer.method for answer in answers[:3]] == ["probe", "0.04", "0.04"]
+    assert len(answers) == 4
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 
 
@@ -140,13 +142,14 @@ def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(monkey
         quick_bodies = property(made.append)
 
     monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
+    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
     monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
     monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
     monkeypatch.setattr(cad_pair, "exact_overlap", lambda *_, **__: Distance(-5.0, method="common part"))
     a = Formed(exact=1, is_simple=True, chords=())
     answers = refine._levels(a, a, np.eye(4), lambda _: False, False)
-    before = [next(answers)[1].method for _ in range(5)]
-    assert (before, made) == (["probe", "distance", *["common part"] * 3], [])
+    before = [next(answers)[1].method for _ in range(4)]
+    assert (before, made) == (["probe", *["common part"] * 3], [])
 
 
 def test_meshes_of_two_shapes_begin_as_coarse_as_the_finer_one_and_end_as_fine():
