@@ -7,6 +7,7 @@ but for an error of each triangle.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -124,10 +125,10 @@ def errors_nearby(a: Surface, b: Surface, T: Array) -> float:
     Lemma: where the meshes do not overlap, the true bodies overlap by no more: a point of both is within each
     triangle's error of it.
     """
-    groups = [(e + f, first, second) for first, e in a.fine_groups for second, f in b.fine_groups]
-    near = rounding_of(a, b, T)
-    for total, first, second in sorted(groups, key=lambda group: -group[0]):
-        if tree_distance(first, second, T) <= total + near:
+    pairs, rounding = itertools.product(a.fine_groups, b.fine_groups), rounding_of(a, b, T)
+    for first, second in sorted(pairs, key=lambda pair: -pair[0].error - pair[1].error):
+        total = first.error + second.error
+        if tree_distance(first.tree, second.tree, T) <= total + rounding:
             return total
     return 0.0
 
@@ -171,15 +172,14 @@ def nearest_points(a: Surface, b: Surface, T: Array) -> tuple[float, float, Arra
 
     lower, best, points = np.inf, np.inf, (np.zeros(3), np.zeros(3))
     turned = T @ TURN
-    for first, e in a.groups:
-        for second, f in b.groups:
-            answer = fcl.DistanceResult()
-            request = fcl.DistanceRequest(enable_nearest_points=True)
-            d = float(fcl.distance(*fcl_pair(first, second, turned), request, answer))
-            lower = min(lower, d - e - f)
-            if d < best:
-                p, q = answer.nearest_points
-                best, points = d, (np.array(p, dtype=np.float64), np.array(q, dtype=np.float64))
+    for first, second in itertools.product(a.groups, b.groups):
+        answer = fcl.DistanceResult()
+        request = fcl.DistanceRequest(enable_nearest_points=True)
+        d = float(fcl.distance(*fcl_pair(first.tree, second.tree, turned), request, answer))
+        lower = min(lower, d - first.error - second.error)
+        if d < best:
+            p, q = answer.nearest_points
+            best, points = d, (np.array(p, dtype=np.float64), np.array(q, dtype=np.float64))
     return lower, max(best, 0.0), *points
 
 

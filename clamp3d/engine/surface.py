@@ -79,27 +79,21 @@ class Surface:
         return fcl_tree(self.vertices, self.faces)
 
     @cached_property
-    def groups(self) -> tuple[tuple[Any, float], ...]:
-        """Triangles by their error: (FCL's tree, largest error in mm), the exact ones first."""
+    def groups(self) -> tuple[Group, ...]:
+        """Its triangles by their errors, the exact ones first."""
         return self._by_error(_LEVELS, 4.0)
 
     @cached_property
-    def fine_groups(self) -> tuple[tuple[Any, float], ...]:
+    def fine_groups(self) -> tuple[Group, ...]:
         """The same with errors that are more alike."""
         return self._by_error(_FINE_LEVELS, 1.5)
 
-    def _by_error(self, levels: int, ratio: float) -> tuple[tuple[Any, float], ...]:
-        if self.face_error is None or self.error == 0.0:
-            return ((self.bvh, 0.0),)
-        level = np.full(len(self.faces), levels)
-        off = self.face_error > 0.0
-        steps = np.log(self.error / self.face_error[off]) / np.log(ratio)
+    def _by_error(self, levels: int, ratio: float) -> tuple[Group, ...]:
+        level, off = np.full(len(self.faces), levels), self.face_errors > 0.0
+        steps = np.log(self.error / self.face_errors[off]) / np.log(ratio)
         level[off] = np.minimum(steps, levels - 1).astype(int)
-        places = sorted(set(level.tolist()), reverse=True)
-        if len(places) == 1:
-            return ((self.bvh, self.error),)
-        rows = [level == k for k in places]
-        return tuple((fcl_tree(self.vertices, self.faces[row]), float(self.face_error[row].max())) for row in rows)
+        rows = [np.flatnonzero(level == k) for k in sorted(set(level.tolist()), reverse=True)]
+        return tuple(Group(self, some, float(self.face_errors[some].max())) for some in rows)
 
     @cached_property
     def manifold(self) -> Any:
@@ -174,14 +168,17 @@ class Surface:
     def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array]:
         """Whether points (k, 3) are behind the triangle nearest to them, and nearest to its middle; how far from it."""
         distance, face, foot = self.nearest(points)
-        corners = self.vertices[self.faces[face]]
-        normal = self.normals[face]
-        sides = np.roll(corners, -1, axis=1) - corners
-        inward = np.cross(normal[:, None], sides)
-        margin = np.einsum("kij,kij->ki", foot[:, None] - corners, inward) / np.maximum((sides**2).sum(axis=2), 1e-300)
-        away = np.einsum("ki,ki->k", points - foot, normal)
-        is_certain = self.has_sides & (margin.min(axis=1) > _MIDDLE) & (np.abs(away) > 1e-9 * self.scale)
+        away = np.einsum("ki,ki->k", points - foot, self.normals[face])
+        is_certain = self.has_sides & self._is_in_middle(face, foot) & (np.abs(away) > 1e-9 * self.scale)
         return away < 0.0, np.asarray(is_certain), distance
+
+    def _is_in_middle(self, face: NDArray[np.int64], points: Array) -> NDArray[np.bool_]:
+        """Which of points (k, 3) on triangles ``face`` (k,) are well within these, and on no other triangle's edge."""
+        corners = self.vertices[self.faces[face]]
+        sides = np.roll(corners, -1, axis=1) - corners
+        inward = np.cross(self.normals[face][:, None], sides)
+        margin = np.einsum("kij,kij->ki", points[:, None] - corners, inward)
+        return np.asarray((margin > _MIDDLE * (sides**2).sum(axis=2)).all(axis=1))
 
     @cached_property
     def has_sides(self) -> bool:
@@ -270,9 +267,10 @@ class Surface:
         """How far (k,) mm the true surface may be from points (k, 3) of this one."""
         if self.face_error is None:
             return np.zeros(len(points))
-        away, face, _ = self.nearest(points)
+        away, face, foot = self.nearest(points)
         # On an edge the nearest triangle is either of two.
-        return np.where(away <= 1e-9 * self.scale, np.maximum(self._edge_error[face], 0.0), self.error)
+        error = np.where(self._is_in_middle(face, foot), self.face_error[face], self._edge_error[face])
+        return np.where(away <= 1e-9 * self.scale, error, self.error)
 
     @cached_property
     def _edge_error(self) -> Array:
@@ -281,6 +279,22 @@ class Surface:
         corner = np.zeros(len(self.vertices))
         np.maximum.at(corner, self.faces.reshape(-1), np.repeat(self.face_error, 3))
         return np.asarray(corner[self.faces].max(axis=1))
+
+
+@dataclass(eq=False)
+class Group:
+    """Triangles ``rows`` (k,) of a surface, none of them off by more than ``error`` mm."""
+
+    surface: Surface
+    rows: NDArray[np.int64]
+    error: float
+
+    @cached_property
+    def tree(self) -> Any:
+        """FCL's tree of them."""
+        if len(self.rows) == len(self.surface.faces):
+            return self.surface.bvh
+        return fcl_tree(self.surface.vertices, self.surface.faces[self.rows])
 
 
 _ROUNDED, _EXACT = 1e-16, 1e-7

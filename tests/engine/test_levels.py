@@ -14,7 +14,7 @@ from clamp3d import Scene, Verdict, check, distance, shapes
 from clamp3d.engine.batch import bounds_at_poses
 from clamp3d.engine.facets import rods_distance
 from clamp3d.engine.farthest import Pieces, Sheet, farthest
-from clamp3d.engine.mesh_distance import are_apart, meshes_distance, nearest_points, surface_distance
+from clamp3d.engine.mesh_distance import are_apart, errors_nearby, meshes_distance, nearest_points, surface_distance
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.near_faces import FaceMeshes, near_faces
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
@@ -313,8 +313,30 @@ def test_errors_beside_an_edge_reach_the_true_edge(angle, errors, apart, widened
         assert math.sqrt(e * e + f * f + 2.0 * e * f * math.cos(w)) / math.sin(w) <= max(widened) * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("gap", [0.003, -0.002])
+def test_errors_of_triangles_that_are_far_from_the_other_mesh_do_not_count(gap):
+    """Two boxes face to face, each side of them with an error of its own, up to a thousandth or up to a millimetre."""
+    rng = np.random.default_rng(7)
+    a, b = box_mesh((10.0, 10.0, 10.0)), box_mesh((6.0, 6.0, 6.0))
+    T = TURNED @ translation(0.2, 0.1, 8.0 + gap) @ inverse(TURNED)
+    for facing in (1e-3, 1.0, 1e-3, 1.0, 1e-3):
+        errors = []
+        for box, side in ((a, 1.0), (b, -1.0)):
+            is_facing, is_opposite = box.normals[:, 2] * side > 0.9, box.normals[:, 2] * side < -0.9
+            errors.append(rng.uniform(0.2, 1.0, len(box.faces)) * np.where(is_opposite, 1.0, 1e-3))
+            errors[-1][is_facing] = facing * rng.uniform(0.2, 1.0)
+        one, other = (Surface(to_target(TURNED, x.vertices), x.faces, e) for x, e in zip((a, b), errors, strict=True))
+        off = errors[0][a.normals[:, 2] > 0.9].max() + errors[1][b.normals[:, 2] < -0.9].max()
+        for first, second, place in ((one, other, T), (other, one, inverse(T))):
+            lower = surface_distance(first, second, place, lambda _: False).lower
+            if gap < 0.0:
+                lower = surface_distance(first, second, place, lambda d, off=off: d.lower > -2.0 * off - 0.01).lower
+            assert -3.0 * off - 0.01 <= lower <= gap - off
+            assert errors_nearby(first, second, place) >= off * (off >= gap)
+
+
 def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_elsewhere():
-    """Bounds by groups of errors against each triangle alone; on an edge the errors of all triangles around count."""
+    """Bounds by groups of errors against each triangle alone; on an edge the errors of both triangles count."""
     rng = np.random.default_rng(5)
     ball, far = trimesh.creation.icosphere(subdivisions=2, radius=10.0), box_mesh((1.0, 2.0, 3.0))
     for k in range(7):
@@ -331,8 +353,9 @@ def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_else
         coarse = np.where(one.face_error > 0.0, np.maximum(4.0 * one.face_error, most / 64.0), 0.0)
         assert (gaps - np.minimum(coarse, most)).min() - 1e-9 <= lower <= (gaps - one.face_error).min() + 1e-9
         middles = ball.triangles_center
-        near = (ball.faces[:, None, :, None] == ball.faces[None, :, None, :]).any((2, 3))
-        assert one.error_at(middles) == pytest.approx(np.where(near, one.face_error, 0.0).max(axis=1))
+        assert one.error_at(middles) == pytest.approx(one.face_error)
+        on_edges = ball.vertices[ball.face_adjacency_edges].mean(axis=1)
+        assert (one.error_at(on_edges) >= one.face_error[ball.face_adjacency].max(axis=1)).all()
         assert one.error_at(1.01 * middles) == pytest.approx(one.face_error.max())
 
 
