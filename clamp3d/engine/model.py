@@ -330,7 +330,7 @@ class CadModel(Model):
         mesh = self.shape.tessellated(chord)
         if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
             raise Clamp3dError(f"the triangles of {self.name} do not close")
-        return Surface(mesh.vertices, mesh.faces, mesh.errors)
+        return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
 
 
 class MeshModel(Model):

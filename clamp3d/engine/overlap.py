@@ -111,11 +111,14 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: 
     sides = [(a, triangles), (b, to_source(T, triangles))]
     places = [(surface, pieces.mean(axis=1)) for surface, pieces in sides]
     is_on = [surface.distance(middles) <= 1e-9 * surface.scale for surface, middles in places]
-    errors = [surface.error_at(middles) for surface, middles in places]
+    errors = [
+        surface.error_at(middles) if surface.has_own_errors else np.full(len(middles), surface.error)
+        for surface, middles in places
+    ]
     every = []
     for (surface, pieces), own, other in zip(sides, (0, 1), (1, 0), strict=True):
         rows = is_on[other] | ~is_on[own]  # those that lie on this surface alone are no way from it
-        every.append(Pieces.of(Sheet(surface, surface.face_errors), pieces[rows], errors[other][rows]))
+        every.append(Pieces.of(Sheet(surface, surface.mutual_errors), pieces[rows], errors[other][rows]))
     return farthest(every, end, cuts)
 
 

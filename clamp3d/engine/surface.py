@@ -46,6 +46,11 @@ class Surface:
     faces: NDArray[np.int64]
     face_error: Array | None = None
     is_simple: bool = True
+    has_own_errors: bool = False
+    """Whether each triangle and its part of the true surface are within its error of each other, up to their borders.
+
+    Else a true point is within the error of some triangle, and a triangle's point within that of a neighbour.
+    """
     last_common: Any = None
     """The mesh and the pose of the last common part that was made with this one, and that part (`overlap.common`)."""
 
@@ -62,6 +67,11 @@ class Surface:
     def face_errors(self) -> Array:
         """The errors (m,) of its triangles, mm."""
         return np.zeros(len(self.faces)) if self.face_error is None else self.face_error
+
+    @property
+    def mutual_errors(self) -> Array:
+        """How far (m,) mm each triangle and its part of the true surface can be from each other."""
+        return self.face_errors if self.has_own_errors else np.full(len(self.faces), self.error)
 
     @cached_property
     def scale(self) -> float:
@@ -81,19 +91,19 @@ class Surface:
     @cached_property
     def groups(self) -> tuple[Group, ...]:
         """Its triangles by their errors, the exact ones first."""
-        return self._by_error(_LEVELS, 4.0)
+        return self._by_error(self.face_errors, _LEVELS, 4.0)
 
     @cached_property
     def fine_groups(self) -> tuple[Group, ...]:
-        """The same with errors that are more alike."""
-        return self._by_error(_FINE_LEVELS, 1.5)
+        """The same by their mutual errors, in groups that are more alike."""
+        return self._by_error(self.mutual_errors, _FINE_LEVELS, 1.5)
 
-    def _by_error(self, levels: int, ratio: float) -> tuple[Group, ...]:
-        level, off = np.full(len(self.faces), levels), self.face_errors > 0.0
-        steps = np.log(self.error / self.face_errors[off]) / np.log(ratio)
+    def _by_error(self, errors: Array, levels: int, ratio: float) -> tuple[Group, ...]:
+        level, off = np.full(len(self.faces), levels), errors > 0.0
+        steps = np.log(self.error / errors[off]) / np.log(ratio)
         level[off] = np.minimum(steps, levels - 1).astype(int)
         rows = [np.flatnonzero(level == k) for k in sorted(set(level.tolist()), reverse=True)]
-        return tuple(Group(self, some, float(self.face_errors[some].max())) for some in rows)
+        return tuple(Group(self, some, float(errors[some].max())) for some in rows)
 
     @cached_property
     def manifold(self) -> Any:
@@ -268,8 +278,10 @@ class Surface:
         if self.face_error is None:
             return np.zeros(len(points))
         away, face, foot = self.nearest(points)
-        # On an edge the nearest triangle is either of two.
-        error = np.where(self._is_in_middle(face, foot), self.face_error[face], self._edge_error[face])
+        # On an edge the nearest triangle is either of two; of a flat one the true border can be that of its neighbour.
+        error = self._edge_error[face]
+        if self.has_own_errors:
+            error = np.where(self._is_in_middle(face, foot), self.face_error[face], error)
         return np.where(away <= 1e-9 * self.scale, error, self.error)
 
     @cached_property

@@ -325,7 +325,10 @@ def test_errors_of_triangles_that_are_far_from_the_other_mesh_do_not_count(gap):
             is_facing, is_opposite = box.normals[:, 2] * side > 0.9, box.normals[:, 2] * side < -0.9
             errors.append(rng.uniform(0.2, 1.0, len(box.faces)) * np.where(is_opposite, 1.0, 1e-3))
             errors[-1][is_facing] = facing * rng.uniform(0.2, 1.0)
-        one, other = (Surface(to_target(TURNED, x.vertices), x.faces, e) for x, e in zip((a, b), errors, strict=True))
+        one, other = (
+            Surface(to_target(TURNED, x.vertices), x.faces, e, has_own_errors=True)
+            for x, e in zip((a, b), errors, strict=True)
+        )
         off = errors[0][a.normals[:, 2] > 0.9].max() + errors[1][b.normals[:, 2] < -0.9].max()
         for first, second, place in ((one, other, T), (other, one, inverse(T))):
             lower = surface_distance(first, second, place, lambda _: False).lower
@@ -353,6 +356,9 @@ def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_else
         coarse = np.where(one.face_error > 0.0, np.maximum(4.0 * one.face_error, most / 64.0), 0.0)
         assert (gaps - np.minimum(coarse, most)).min() - 1e-9 <= lower <= (gaps - one.face_error).min() + 1e-9
         middles = ball.triangles_center
+        near = (ball.faces[:, None, :, None] == ball.faces[None, :, None, :]).any((2, 3))
+        assert one.error_at(middles) == pytest.approx(np.where(near, one.face_error, 0.0).max(axis=1))
+        one.has_own_errors = True
         assert one.error_at(middles) == pytest.approx(one.face_error)
         on_edges = ball.vertices[ball.face_adjacency_edges].mean(axis=1)
         assert (one.error_at(on_edges) >= one.face_error[ball.face_adjacency].max(axis=1)).all()
