@@ -66,19 +66,10 @@ def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Fa
     gap = tree_distance(a.surface.bvh, b.surface.bvh, T)
     if gap <= 0.0:
         return None
-    if not (_stands_out(b.surface, a.surface, T) and _stands_out(a.surface, b.surface, inverse(T))):
+    corners_b, corners_a = to_target(T, b.surface.vertices), to_target(inverse(T), a.surface.vertices)
+    if not (a.surface.is_any_outside(corners_b) and b.surface.is_any_outside(corners_a)):
         return None
     off = a.surface.error + b.surface.error
     # The solids are no further apart than their triangles and this, nor a face nearer than its triangles less this.
     limit = gap + 2.0 * off
     return a.near(b.surface, T, limit), b.near(a.surface, inverse(T), limit)
-
-
-def _stands_out(part: Surface, other: Surface, T: Array) -> bool:
-    """Whether some corner of a mesh, which lies on its solid, is certainly outside another; ``part`` is at ``T``."""
-    points = to_target(T, part.vertices)
-    slack = other.error + 1e-9 * (other.scale + part.scale)
-    if ((points < other.box[0] - slack) | (points > other.box[1] + slack)).any():
-        return True
-    away = points[other.distance(points) > slack]
-    return bool(len(away)) and not other.contains(away).all()

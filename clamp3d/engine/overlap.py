@@ -75,10 +75,10 @@ class Common(Surface):
 
 def common(a: Surface, b: Surface, T: Array) -> Common | None:
     """The common part of ``a`` and of ``b`` at ``T`` (4, 4) in a's frame; None if there is none."""
-    asked = (b, T.tobytes())
-    if a.last_common is None or a.last_common[0] != asked:  # a pair's levels ask for the same one after the other
+    placed = (b, T.tobytes())
+    if a.last_common is None or a.last_common[0] != placed:  # a pair's levels ask for the same one after the other
         vertices, faces = arrays_of(a.manifold ^ b.manifold.transform(np.ascontiguousarray(T[:3])))
-        a.last_common = asked, Common(vertices, faces) if len(faces) else None
+        a.last_common = placed, Common(vertices, faces) if len(faces) else None
     part: Common | None = a.last_common[1]
     return part
 
@@ -102,24 +102,25 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: 
     """Upper bound (mm) of how deep what one mesh's triangles in the other stand for can lie in the true other body.
 
     It is sharpened until ``end``, of the bound and of what none can be less than, or ``cuts`` are made. Infinite where
-    one body may be swallowed whole, since the surfaces then say nothing of its middle, and of a common part with more
-    triangles than it may be cut into.
+    no bound can be enough for that, where one body may be swallowed whole, since the surfaces then say nothing of its
+    middle, and of a common part with more triangles than it may be cut into.
     """
     if len(shared.faces) > cuts or _may_be_swallowed(a, b, T, shared):
         return np.inf
-    triangles = shared.vertices[shared.faces]
-    sides = [(a, triangles), (b, to_source(T, triangles))]
-    places = [(surface, pieces.mean(axis=1)) for surface, pieces in sides]
-    is_on = [surface.distance(middles) <= 1e-9 * surface.scale for surface, middles in places]
-    errors = [
-        surface.error_at(middles) if surface.has_own_errors else np.full(len(middles), surface.error)
-        for surface, middles in places
-    ]
-    every = []
-    for (surface, pieces), own, other in zip(sides, (0, 1), (1, 0), strict=True):
-        rows = is_on[other] | ~is_on[own]  # those that lie on this surface alone are no way from it
-        every.append(Pieces.of(Sheet(surface, surface.mutual_errors), pieces[rows], errors[other][rows]))
-    return farthest(every, end, cuts)
+    in_a = shared.vertices[shared.faces]
+    in_b = to_source(T, in_a)
+    (on_a, off_a), (on_b, off_b) = _origins(a, in_a), _origins(b, in_b)
+    # Those that lie on a surface alone are no way from it.
+    sides = (a, in_a, on_b | ~on_a, off_b), (b, in_b, on_a | ~on_b, off_a)
+    every = [Pieces.of(Sheet(s, s.mutual_errors), pieces[rows], errors[rows]) for s, pieces, rows, errors in sides]
+    return np.inf if end(np.inf, max(pieces.reached for pieces in every)) else farthest(every, end, cuts)
+
+
+def _origins(surface: Surface, pieces: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which triangles (m, 3, 3) lie on a surface, and how far (m,) mm what they stand for can be from them."""
+    middles = pieces.mean(axis=1)
+    on = surface.distance(middles) <= 1e-9 * surface.scale
+    return on, surface.error_at(middles) if surface.has_own_errors else np.full(len(middles), surface.error)
 
 
 def _may_be_swallowed(a: Surface, b: Surface, T: Array, shared: Common) -> bool:

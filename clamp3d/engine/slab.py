@@ -46,8 +46,7 @@ def _height_over(flat: Model, other: Model, T: Array, enough: Enough) -> float:
         return -np.inf
     height = _height_of(flat, normal, near)
     highest = points[np.argsort(-(points @ normal))[:_HIGHEST]]
-    above = highest[(highest @ normal > height) & (mesh.distance(highest) > mesh.error)]
-    if not len(above) or mesh.contains(above).all():
+    if not mesh.is_any_outside(highest[highest @ normal > height]):
         return -np.inf
     every = np.arange(len(others.faces))
     return float(normal @ T[:3, 3]) - _height_of(other, -normal @ T[:3, :3], every) - height

@@ -175,6 +175,14 @@ class Surface:
         inside[rows] = behind
         return np.asarray(inside)
 
+    def is_any_outside(self, points: Array) -> bool:
+        """Whether some of points (k, 3) are certainly outside the true body."""
+        slack = self.error + 1e-9 * (self.scale + float(np.abs(points).max(initial=0.0)))
+        if ((points < self.box[0] - slack) | (points > self.box[1] + slack)).any():
+            return True
+        away = points[self.distance(points) > slack]
+        return bool(len(away)) and not self.contains(away).all()
+
     def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array]:
         """Whether points (k, 3) are behind the triangle nearest to them, and nearest to its middle; how far from it."""
         distance, face, foot = self.nearest(points)

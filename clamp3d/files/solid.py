@@ -80,8 +80,8 @@ class BrepSolid(MeshShape):
         """How high (n,) mm each face reaches along a unit vector (3,); infinite for splines, which is not certain."""
         key = tuple(direction.round(12).tolist())
         if key not in self._tops:
-            frame = np.eye(4)
-            frame[:2, :3], frame[2, :3] = np.linalg.svd(direction[None])[2][1:], direction
+            frame, across = np.eye(4), np.linalg.svd(direction[None])[2][1]
+            frame[:3, :3] = np.cross(across, direction), across, direction
             tops = cad_process.face_bounds_at(self.brep, frame)[:, 1, 2]
             self._tops[key] = np.where(self.surfaces.kind == OTHER, np.inf, tops)
         return self._tops[key]
