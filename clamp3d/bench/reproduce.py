@@ -14,9 +14,8 @@ from clamp3d.bench.image import image_study
 from clamp3d.clamp.assemble import assemble
 from clamp3d.clamp.dimensions import ConnectionType, PartName
 from clamp3d.clamp.loader import load_clamp
-from clamp3d.clamp.matrix import millimetres
 from clamp3d.clamp.parts import groove_pairs
-from clamp3d.clamp.result import Assembly, Solver
+from clamp3d.clamp.result import Assembly, Solver, millimetres
 from clamp3d.engine.distance import Distance
 from clamp3d.errors import need
 from clamp3d.geometry.pose import Array, inverse

@@ -10,7 +10,7 @@ from typing import Any
 from clamp3d.bench import published
 from clamp3d.bench.reproduce import PoseRow, RelationRow, Reproduction, WorkRow
 from clamp3d.clamp.dimensions import TITLES
-from clamp3d.clamp.matrix import millimetres
+from clamp3d.clamp.result import millimetres
 from clamp3d.engine.distance import Distance
 from clamp3d.output.pages import render
 from clamp3d.output.tables import text_table

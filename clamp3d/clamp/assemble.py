@@ -12,18 +12,16 @@ from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import array, choice, function, text
 from clamp3d.clamp.closing import open_start
 from clamp3d.clamp.contact import Contact, measure_contacts
-from clamp3d.clamp.dimensions import PARTS, Clamp, Joints
+from clamp3d.clamp.dimensions import PAIRS, PARTS, TOUCHING, Clamp, Joints
 from clamp3d.clamp.equilibria import describe, equilibria, same
 from clamp3d.clamp.final_state import FinalState, solve_final_state
 from clamp3d.clamp.loader import WireSize, load_clamp
-from clamp3d.clamp.matrix import PAIRS, Difference
 from clamp3d.clamp.play import Log, meetings, play
-from clamp3d.clamp.result import Assembly, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
+from clamp3d.clamp.result import Assembly, Difference, Equilibrium, Event, Play, Solver, Start, Waypoint, Work
 from clamp3d.clamp.section import HELD, D, S, Section
 from clamp3d.clamp.sequence import Step, parse_sequence
 from clamp3d.clamp.status import closing_status
 from clamp3d.clamp.stepped import SteppedState, solve_stepped
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.clamp.ways import Closing, Meetings
 from clamp3d.errors import SolverError
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, nnls
 
-from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.dimensions import Pair
 from clamp3d.clamp.section import SIZE, D, Gaps, Section
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import Array

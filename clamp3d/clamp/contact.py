@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from clamp3d.baselines.model import ContactModel
-from clamp3d.clamp.dimensions import Clamp, ConnectionType, PartName
-from clamp3d.clamp.matrix import PAIRS, Pair, plain
-from clamp3d.clamp.parts import groove_pairs, parts
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.dimensions import PAIRS, TOUCHING, Clamp, ConnectionType, Pair, PartName
+from clamp3d.clamp.parts import clamp_scene, groove_pairs, parts
+from clamp3d.clamp.plain import plain
 from clamp3d.clamp.section import SPLINTS
-from clamp3d.clamp.surfaces import SURFACES, TOUCHING, Surface, surfaces_at
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.distance import measure
 from clamp3d.engine.model import ModelCache
 from clamp3d.geometry.pose import Array, SectionPose, inverse
+from clamp3d.geometry.profile import Arc, Edge
+from clamp3d.geometry.shapes import Solid
 from clamp3d.kernel.arc_and_circle import classify_arc_circle
 from clamp3d.kernel.contact_model import GroovePair
 from clamp3d.kernel.rectangle import Rectangle, hole_bolt
@@ -34,6 +35,17 @@ SCREW_JOINT = "screw joint"
 """Relation of a bolt and its nut."""
 _PARALLEL = 1e-8
 """Turn of two flat faces in rad up to which they meet as faces: over 100 mm that is `TOUCHING`."""
+
+SURFACES = ("lip", "arc", "hole", "flat face", "round face", "end face")
+"""Names of surfaces; of two that touch the one that comes first names the contact."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """A surface of a solid: its ``name``, one of `SURFACES`, and the unit vector (3,) out of it where it is flat."""
+
+    name: str
+    normal: Array | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,3 +201,53 @@ def _hole_relation(clamp: Clamp, poses: Poses, splint: PartName) -> str:
     centre = poses[splint].point(middle, 0.5 * (top + bottom))
     hole = Rectangle(*centre, width / 2, 0.5 * (bottom - top), poses[splint].angle)
     return hole_bolt(hole, bolt, tolerance=TOUCHING).relation.value
+
+
+def surfaces_at(solid: Solid, T: Array, point: Array, tolerance: float = TOUCHING) -> tuple[Surface, ...]:
+    """The surfaces of a solid at ``T`` (4, 4) that are nearest to a point (3,), to within ``tolerance`` mm.
+
+    A lip is where a concave arc ends.
+
+    >>> from clamp3d.geometry.shapes import cylinder
+    >>> [surface.name for surface in surfaces_at(cylinder(5.0, 20.0), np.eye(4), np.array([5.0, 0.0, 3.0]))]
+    ['round face']
+    """
+    near: list[tuple[float, Surface]] = []
+    local = (point - T[:3, 3]) @ T[:3, :3]
+    for extrusion in (*solid.bodies, *solid.holes):
+        is_hole = extrusion in solid.holes
+        frame = T[:3, :3] @ extrusion.frame
+        a, b, along = (local @ extrusion.frame).tolist()
+        for edge in extrusion.profile.edges:
+            name, normal = "hole" if is_hole else _edge_name(edge, a, b), None
+            if not isinstance(edge, Arc):  # the material is on the left of an outline's edge
+                right, up = np.subtract(edge.end, edge.start) / math.dist(edge.end, edge.start)
+                normal = frame[:, :2] @ (up, -right)
+            near.append((_edge_distance(edge, a, b), Surface(name, normal)))
+        for end, side in ((extrusion.start, -1.0), (extrusion.end, 1.0)) if not is_hole else ():
+            name = "end face" if extrusion.axis == "Y" else "flat face"
+            near.append((abs(along - end), Surface(name, side * frame[:, 2])))
+    least = min(distance for distance, _ in near)
+    return tuple(surface for distance, surface in near if distance <= least + tolerance)
+
+
+def _edge_distance(edge: Edge, a: float, b: float) -> float:
+    """How far a point (a, b) is from an edge of an outline, mm."""
+    if isinstance(edge, Arc):
+        da, db = a - edge.centre[0], b - edge.centre[1]
+        low, high = sorted((edge.start_angle, edge.end_angle))
+        if (math.atan2(db, da) - low) % (2.0 * math.pi) <= high - low:
+            return abs(math.hypot(da, db) - edge.radius)
+        return min(math.dist((a, b), edge.start), math.dist((a, b), edge.end))
+    (a0, b0), (a1, b1) = edge.start, edge.end
+    t = ((a - a0) * (a1 - a0) + (b - b0) * (b1 - b0)) / ((a1 - a0) ** 2 + (b1 - b0) ** 2)
+    t = min(max(t, 0.0), 1.0)
+    return math.dist((a, b), (a0 + t * (a1 - a0), b0 + t * (b1 - b0)))
+
+
+def _edge_name(edge: Edge, a: float, b: float) -> str:
+    if not isinstance(edge, Arc):
+        return "flat face"
+    if edge.sweep > 0.0:
+        return "round face"
+    return "lip" if min(math.dist((a, b), edge.start), math.dist((a, b), edge.end)) <= TOUCHING else "arc"

@@ -6,6 +6,7 @@ Section frame of the paper: x right, y down, so "depth" and "below" are along +y
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Annotated, Literal, TypeAlias
 
@@ -39,6 +40,18 @@ TITLES: dict[PartName, str] = {
     "P6": "power line",
     "P7": "jumper",
 }
+TYPES: dict[ConnectionType, str] = {
+    0: "no connection",
+    1: "screw joint",
+    2: "convex object collision",
+    3: "concave arc surface collision",
+}
+"""Eq. 1 of the paper."""
+Pair = tuple[PartName, PartName]
+PAIRS: tuple[Pair, ...] = tuple(itertools.combinations(PARTS, 2))
+"""All pairs of parts, in the order of the matrix."""
+TOUCHING = 1e-6
+"""Gap or overlap in mm up to which two parts of a clamp touch: a thousand times what a proof leaves."""
 
 
 @checked

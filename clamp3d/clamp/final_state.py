@@ -10,16 +10,15 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import CLOSING, STILL, STRIDE, OnContact, descend, open_start
-from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.forces import HELD as HELD_ON_AXIS
-from clamp3d.clamp.forces import Force, world_force
-from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.dimensions import Clamp, Pair, PartName
+from clamp3d.clamp.result import HELD_ON_AXIS, Force
 from clamp3d.clamp.section import HELD, SIZE, WIRES, D, Gaps, S, Section, U
 from clamp3d.clamp.status import ClosingStatus, closing_status
 from clamp3d.errors import InputError, SolverError
@@ -112,6 +111,13 @@ class FinalState:
             down = section.down_splint(q)
             forces.append(world_force(q, "P4", "P2", HELD_ON_AXIS, np.array([-total, 0.0]), (down.x, down.y)))
         return tuple(forces)
+
+
+def world_force(q: Array, a: PartName, b: PartName, feature: str, push: Array, at: Any) -> Force:
+    """A force from what the section knows: ``push`` (2,) and ``at`` (2,) in P1's section frame at the state ``q``."""
+    size = float(np.hypot(*push))
+    point = np.array([at[0] - q[0], 0.0, q[1] - at[1]])
+    return Force(a, b, feature, size, point, np.array([push[0], 0.0, -push[1]]) / size)
 
 
 def solve_final_state(

@@ -31,9 +31,9 @@ from scipy.optimize import bisect, nnls
 
 from clamp3d.clamp.closing import CLOSING
 from clamp3d.clamp.dimensions import Clamp, Joints
-from clamp3d.clamp.final_state import closed
-from clamp3d.clamp.forces import Force, world_force
-from clamp3d.clamp.matrix import plain
+from clamp3d.clamp.final_state import closed, world_force
+from clamp3d.clamp.plain import plain
+from clamp3d.clamp.result import Force
 from clamp3d.clamp.section import HELD, SIZE, SPLINTS, WIRES, D, Gaps, S, Section
 from clamp3d.clamp.torque import coefficients
 from clamp3d.errors import InputError, SolverError

@@ -1,4 +1,4 @@
-"""The seven parts as analytic bodies: outlines drawn along an axis, less their holes, and their grooves. No mesh here.
+"""The seven parts as analytic bodies: outlines drawn along an axis, less their holes, their grooves, and their scene.
 
 Part frames: origin as published, part's middle at Y = 0; axes X right, Y along the wires, Z up. Section outlines are
 given in the paper's section coordinates u right, v down, so X = u and Z = -v.
@@ -7,6 +7,7 @@ given in the paper's section coordinates u right, v down, so X = u and Z = -v.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from clamp3d.checks import instance
 from clamp3d.clamp.dimensions import (
     TITLES,
+    TOUCHING,
     Bolt,
     Clamp,
     DownSplint,
@@ -23,6 +25,8 @@ from clamp3d.clamp.dimensions import (
     Saddle,
     UpSplint,
 )
+from clamp3d.engine.allowed import Allowed
+from clamp3d.engine.scene import Part, Scene
 from clamp3d.errors import InputError
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array
@@ -57,6 +61,13 @@ def parts(clamp: Clamp) -> dict[PartName, Solid]:
         "P6": wire_solid("P6", clamp.line.radius, clamp.wire_length),
         "P7": wire_solid("P7", clamp.jumper.radius, clamp.wire_length),
     }
+
+
+def clamp_scene(clamp: Clamp, poses: Mapping[str, Array], *, clearance: float = 0.0) -> Scene:
+    """The parts P1 to P7 at ``poses`` (``T_world_part``, mm); contacts that the matrix declares are allowed."""
+    placed = tuple(Part(name, solid, poses[name]) for name, solid in parts(clamp).items())
+    allowed = tuple(Allowed(a, b) for a, row in clamp.connections.items() for b, kind in row.items() if kind)
+    return Scene(placed, TOUCHING, clearance, allowed, name=clamp.name)
 
 
 def groove_pairs(clamp: Clamp) -> dict[tuple[PartName, PartName], GroovePair]:

@@ -10,13 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clamp3d.clamp.contact import Poses, measure_contacts
-from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.dimensions import TITLES, TOUCHING, Clamp, Pair, PartName
 from clamp3d.clamp.parts import parts
 from clamp3d.clamp.result import Event, Waypoint
 from clamp3d.clamp.section import B, D, Section, W
 from clamp3d.clamp.sequence import Step, as_published
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.clamp.ways import DIRECTIONS, SPARE, Closing, Leg, Offsets, Plan, corners
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache

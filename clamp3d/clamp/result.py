@@ -10,16 +10,90 @@ from clamp3d import __version__
 from clamp3d.baselines.model import ContactModel
 from clamp3d.checks import instance
 from clamp3d.clamp.contact import Contact, measure_contacts, overlap
-from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.forces import Force
-from clamp3d.clamp.matrix import Difference, Pair, plain
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.dimensions import TITLES, TYPES, Clamp, ConnectionType, Pair, PartName
+from clamp3d.clamp.parts import clamp_scene
+from clamp3d.clamp.plain import plain
 from clamp3d.clamp.status import ClosingStatus, Seat
 from clamp3d.engine.scene import Scene
 from clamp3d.errors import InputError, need
 from clamp3d.geometry.pose import Array, SectionPose
 
 Solver = Literal["exact", "stepped", "bisection"]
+HELD_ON_AXIS = "held on the bolt's axis"
+"""What carries the sideways force that frictionless contacts leave, where the joints are said to have no play."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Force:
+    """A contact force: part a pushes part b.
+
+    Attributes
+    ----------
+    a, b : str
+        The two parts.
+    feature : str
+        What touches, as the section names it; `HELD_ON_AXIS` is no contact but an assumption.
+    force : float
+        Newton per newton of bolt force.
+    point : ndarray (3,)
+        Where it acts, in the world, mm.
+    direction : ndarray (3,)
+        Unit vector in which b is pushed, in the world.
+    """
+
+    a: PartName
+    b: PartName
+    feature: str
+    force: float
+    point: Array
+    direction: Array
+
+
+def millimetres(gap: float) -> str:
+    """A gap in mm for people: three digits, more where it is smaller than they show, and 0 for rounding.
+
+    >>> [millimetres(gap) for gap in (1.0, 0.0012, -9.876e-4, 6e-10, 4e-10)]
+    ['1.000', '0.001', '-0.000988', '6e-10', '0']
+    """
+    return "0" if abs(gap) < 5e-10 else f"{gap:.3g}" if abs(gap) < 1e-3 else f"{gap:.3f}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Difference:
+    """A pair whose measured contact is not the declared one.
+
+    Attributes
+    ----------
+    a, b : str
+        The two parts.
+    declared, measured : int
+        Types of the connection matrix; 0 is no contact.
+    gap : float or None
+        Signed distance of the two in the final state, mm; None for a meeting on the way.
+    place : ndarray (3,) or None
+        Where it is measured, on part a in the world, mm.
+    where : str
+        When it was seen: "the final state", or a step of the sequence.
+    """
+
+    a: PartName
+    b: PartName
+    declared: ConnectionType
+    measured: ConnectionType
+    gap: float | None
+    place: Array | None
+    where: str = "the final state"
+
+    def __str__(self) -> str:
+        pair = f"{self.a}-{self.b} ({TITLES[self.a]}, {TITLES[self.b]})"
+        declared = f"declared {self.declared} ({TYPES[self.declared]})"
+        if self.gap is not None and self.measured == 0:
+            return f"{pair} {declared} but does not touch: {millimetres(self.gap)} mm apart in {self.where}"
+        return f"{pair} {declared} but met as {self.measured} ({TYPES[self.measured]}) in {self.where}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return plain(self, gap="gap_mm", place="point") | {"text": str(self)}
 
 
 @dataclass(frozen=True, slots=True)

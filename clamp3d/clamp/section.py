@@ -20,8 +20,7 @@ import numpy as np
 
 from clamp3d.baselines.model import ContactModel, check_model
 from clamp3d.checks import instance
-from clamp3d.clamp.dimensions import PARTS, Clamp, PartName
-from clamp3d.clamp.matrix import Pair
+from clamp3d.clamp.dimensions import PARTS, Clamp, Pair, PartName
 from clamp3d.clamp.parts import groove_pairs
 from clamp3d.geometry.pose import Array, SectionPose
 

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Literal
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.contact import measure_contacts, overlap
-from clamp3d.clamp.dimensions import TITLES, Clamp, PartName
-from clamp3d.clamp.matrix import PAIRS, Pair
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.dimensions import PAIRS, TITLES, TOUCHING, Clamp, Pair, PartName
+from clamp3d.clamp.parts import clamp_scene
 from clamp3d.clamp.section import EDGE, EDGES, SPLINTS, WIRES, D, Gaps, Section
 from clamp3d.clamp.stepped import SteppedState
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.check import check
 from clamp3d.engine.result import NOT_CLEAN
 from clamp3d.geometry.pose import Array

@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 
 from clamp3d.checks import number
 from clamp3d.clamp.dimensions import Clamp, PartName
-from clamp3d.clamp.forces import HELD, Force
-from clamp3d.clamp.matrix import plain
-from clamp3d.clamp.result import Assembly
+from clamp3d.clamp.plain import plain
+from clamp3d.clamp.result import HELD_ON_AXIS, Assembly, Force
 from clamp3d.clamp.section import WIRES
 from clamp3d.errors import InputError
 
@@ -192,7 +191,7 @@ def tighten(
     contacts = tuple(
         ContactLoad(force, preload.times(force.force, force.force), grooves.get(force.a) if force.b in WIRES else None)
         for force in assembly.forces
-        if force.feature != HELD
+        if force.feature != HELD_ON_AXIS
     )
     held = {wire: sum(load.force.force for load in contacts if wire == load.force.b) for wire in WIRES}
     slip = {wire: preload.times(groove[0] * share, groove[-1] * share) for wire, share in held.items()}

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clamp3d.clamp.dimensions import PARTS, TITLES, Clamp, PartName
-from clamp3d.clamp.matrix import Pair, plain
+from clamp3d.clamp.dimensions import PARTS, TITLES, TOUCHING, Clamp, Pair, PartName
 from clamp3d.clamp.parts import parts, wire_solid
+from clamp3d.clamp.plain import plain
 from clamp3d.clamp.section import WIRES, D, Section
 from clamp3d.clamp.sequence import Step
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.allowed import Allowed
 from clamp3d.engine.check import check
 from clamp3d.engine.model import ModelCache

@@ -9,11 +9,10 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from clamp3d.clamp.contact import measure_contacts
-from clamp3d.clamp.dimensions import PartName
+from clamp3d.clamp.dimensions import TOUCHING, PartName
 from clamp3d.clamp.result import Assembly, Waypoint
 from clamp3d.clamp.section import WIRES, Section
 from clamp3d.clamp.status import Seat, seats
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.output.section import Poses, edge_openings
 

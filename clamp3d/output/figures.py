@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.checks import instance, whole
 from clamp3d.checks import path as checked_path
 from clamp3d.clamp.contact import Contact
-from clamp3d.clamp.dimensions import Clamp
+from clamp3d.clamp.dimensions import TOUCHING, Clamp
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.verdict import Thresholds
 from clamp3d.errors import InputError, need
 from clamp3d.output.files import STDOUT, whole_file

@@ -32,9 +32,8 @@ def stl(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
     """
-    _check_rounding("stl", items, unit)
     header = f"clamp3d {title}; unit {unit}; Z up".encode("ascii", "replace")[:80].ljust(80, b" ")
-    mesh = _joined(items, unit)
+    mesh = _joined("stl", items, unit)
     mesh.vertices = mesh.vertices.astype(np.float32)  # the normals in the file are those of its own corners
     return header + bytes(trimesh.exchange.stl.export_stl(mesh))[80:]
 
@@ -44,10 +43,9 @@ def ply(items: Sequence[PosedMesh], title: str, unit: str, _: float) -> bytes:
 
     Raises InputError if 32-bit numbers would move a vertex by more than the mesh error (0.1 um at least).
     """
-    _check_rounding("ply", items, unit)
     lines = [f"comment clamp3d {title}", f"comment unit {unit}, Z up", *(f"comment part {i.label}" for i in items)]
     comments = "".join(f"{line}\n" for line in lines).encode("ascii", "replace")
-    content = bytes(trimesh.exchange.ply.export_ply(_joined(items, unit), vertex_normal=False))
+    content = bytes(trimesh.exchange.ply.export_ply(_joined("ply", items, unit), vertex_normal=False))
     start, vertices, rest = content.partition(b"element vertex")
     return start + comments + vertices + rest
 
@@ -188,8 +186,18 @@ def _in_six_digits(item: PosedMesh, unit: str) -> tuple[Array, Array]:
     return local + 0.0, written
 
 
-def _check_rounding(format: str, items: Sequence[PosedMesh], unit: str) -> None:
-    """Raise InputError if the 32-bit coordinates of a format would lose more than the mesh error (0.1 um at least)."""
+def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
+    """A part's mesh in the world in a file's unit, without negative zeros, in its colour."""
+    vertices = item.world / UNITS_MM[unit] + 0.0
+    colours = np.tile(np.array([*rgb(item.colour), 255], dtype=np.uint8), (len(vertices), 1))
+    return trimesh.Trimesh(vertices, item.mesh.faces, vertex_colors=colours, process=False)
+
+
+def _joined(format: str, items: Sequence[PosedMesh], unit: str) -> trimesh.Trimesh:
+    """All meshes as one, for a format of 32-bit numbers.
+
+    Raises InputError if these would move a vertex by more than the mesh error (0.1 um at least).
+    """
     allowed = max(1e-4, min(item.mesh.metadata["mesh_error"] for item in items))
     for item in items:
         corners = item.world / UNITS_MM[unit]
@@ -199,15 +207,4 @@ def _check_rounding(format: str, items: Sequence[PosedMesh], unit: str) -> None:
                 f"{format} holds 32-bit numbers: the pose of {item.label} would lose {rounding:.2g} mm, allowed "
                 f"{allowed:.2g} mm; bring the parts to the origin, or use glb, 3mf, step or obj"
             )
-
-
-def _mesh(item: PosedMesh, unit: str) -> trimesh.Trimesh:
-    """A part's mesh in the world in a file's unit, without negative zeros, in its colour."""
-    vertices = item.world / UNITS_MM[unit] + 0.0
-    colours = np.tile(np.array([*rgb(item.colour), 255], dtype=np.uint8), (len(vertices), 1))
-    return trimesh.Trimesh(vertices, item.mesh.faces, vertex_colors=colours, process=False)
-
-
-def _joined(items: Sequence[PosedMesh], unit: str) -> trimesh.Trimesh:
-    """All meshes as one."""
     return trimesh.util.concatenate([_mesh(item, unit) for item in items])  # type: ignore[return-value]

@@ -10,8 +10,8 @@ import numpy as np
 from clamp3d import __version__
 from clamp3d.baselines.cas import Cas
 from clamp3d.clamp.closing import open_start
-from clamp3d.clamp.matrix import plain
 from clamp3d.clamp.placement import Limits, Outcome, Placement
+from clamp3d.clamp.plain import plain
 from clamp3d.clamp.section import Section
 from clamp3d.output.figures import blank, title
 from clamp3d.output.section import draw_section

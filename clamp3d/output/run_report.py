@@ -10,8 +10,7 @@ import numpy as np
 
 from clamp3d.clamp.contact import Contact
 from clamp3d.clamp.dimensions import TITLES
-from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.result import Assembly, Play
+from clamp3d.clamp.result import HELD_ON_AXIS, Assembly, Play
 from clamp3d.clamp.sequence import as_published, parse_sequence
 from clamp3d.output.tables import text_table
 from clamp3d.output.wording import distance_text
@@ -45,12 +44,12 @@ def _summary(assembly: Assembly) -> Iterator[str]:
     if assembly.with_play:
         yield "with play: " + ", ".join(map(_play, assembly.with_play))
     if assembly.forces:
-        pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD)
+        pushes = ", ".join(f"{f.a}-{f.b} {f.force:.3f}" for f in assembly.forces if f.feature != HELD_ON_AXIS)
         yield f"contact forces per newton of bolt force: {pushes}"
         yield from (
             f"a sideways force of {f.force:.3f} is not balanced: the down splint is assumed {f.feature} (see [joints])"
             for f in assembly.forces
-            if f.feature == HELD
+            if f.feature == HELD_ON_AXIS
         )
     yield from map(str, assembly.others or ())
 

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from clamp3d.checks import instance, number
-from clamp3d.clamp.forces import HELD
-from clamp3d.clamp.matrix import plain
-from clamp3d.clamp.result import Assembly, Waypoint
+from clamp3d.clamp.plain import plain
+from clamp3d.clamp.result import HELD_ON_AXIS, Assembly, Waypoint
 from clamp3d.engine.check import check
 from clamp3d.engine.result import BAD, CheckResult, PairResult, Work
 from clamp3d.engine.scene import Scene
@@ -115,7 +114,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         if isinstance(result, Assembly):
             for waypoint in result.path[len(drawing.timeline.stops) :]:
                 self.show(waypoint)
-            forces = [force for force in result.forces if force.feature != HELD]
+            forces = [force for force in result.forces if force.feature != HELD_ON_AXIS]
             drawing.forces(forces)
             drawing.play(self._accuracy)
             worst = {finding.severity for finding in result.findings}

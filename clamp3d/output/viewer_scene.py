@@ -18,7 +18,7 @@ from meshcat.path import Path
 from meshcat.visualizer import Visualizer
 from numpy.typing import ArrayLike
 
-from clamp3d.clamp.forces import Force
+from clamp3d.clamp.result import Force
 from clamp3d.engine.model import box_corners
 from clamp3d.engine.result import BAD
 from clamp3d.geometry.pose import Array, to_target, translation

@@ -16,10 +16,9 @@ from meshcat.visualizer import Visualizer
 
 from clamp3d.baselines.model import ContactModel
 from clamp3d.clamp.contact import NONE, measure_contacts
-from clamp3d.clamp.dimensions import TITLES, Clamp
+from clamp3d.clamp.dimensions import TITLES, TOUCHING, Clamp
+from clamp3d.clamp.parts import clamp_scene
 from clamp3d.clamp.result import Assembly, Waypoint
-from clamp3d.clamp.scene import clamp_scene
-from clamp3d.clamp.surfaces import TOUCHING
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.distance import measure
 from clamp3d.engine.model import ModelCache

@@ -10,10 +10,9 @@ import shapely
 
 from clamp3d import assemble, load_clamp, measure
 from clamp3d.baselines import Chords, contact_model
-from clamp3d.clamp.contact import measure_contacts, overlap
+from clamp3d.clamp.contact import measure_contacts, overlap, surfaces_at
 from clamp3d.clamp.dimensions import GrooveDimensions
 from clamp3d.clamp.parts import parts
-from clamp3d.clamp.surfaces import surfaces_at
 from clamp3d.geometry.pose import SectionPose
 from clamp3d.geometry.profile import Arc
 from tests.clamp.random_clamps import changed

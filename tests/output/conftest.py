@@ -5,7 +5,7 @@ import pytest
 
 from clamp3d import assemble, load_clamp
 from clamp3d.clamp.dimensions import PARTS
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.parts import clamp_scene
 from clamp3d.kernel import rotation, translation
 from clamp3d.output.report import make_report
 from clamp3d.output.report_page import report_html

@@ -12,8 +12,7 @@ import trimesh
 
 from clamp3d import InputError, Part, Scene, export, load, shapes
 from clamp3d.clamp.dimensions import PARTS, TITLES
-from clamp3d.clamp.parts import parts
-from clamp3d.clamp.scene import clamp_scene
+from clamp3d.clamp.parts import clamp_scene, parts
 from clamp3d.geometry.meshing import volume_bounds
 from clamp3d.kernel import translation
 from clamp3d.output.export import FORMATS

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 import clamp3d.output.viewer
 from clamp3d import InputError, Motion, Scene, assemble, load_clamp, measure, shapes, view
-from clamp3d.clamp.forces import HELD
+from clamp3d.clamp.result import HELD_ON_AXIS
 from clamp3d.engine.check import check
 from clamp3d.errors import Clamp3dError
 from clamp3d.kernel import translation
@@ -134,7 +134,7 @@ def test_an_arrow_for_each_contact_force_as_long_as_its_part_of_the_bolts(record
     for c in commands:
         if re.match(f"/clamp3d/forces/{len(assembly.path)} nut tightened/.*/arrow$", c["path"]):
             arrows[c["path"].split("/")[4]] = points_of(commands, c)
-    contacts = [force for force in assembly.forces if force.feature != HELD]
+    contacts = [force for force in assembly.forces if force.feature != HELD_ON_AXIS]
     assert list(arrows) == [f"{f.a}-{f.b}" for f in contacts]
     pushes = {}
     for force in contacts:
