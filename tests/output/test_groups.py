@@ -152,6 +152,7 @@ def test_one_part_of_many_that_moves_is_named_though_its_verdict_stays(tmp_path)
     assert check_to_dict(result, comparison)["moved_mm"] == comparison.moved
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_commands_compare_with_a_baseline_and_accept(tmp_path, monkeypatch, main):
     monkeypatch.chdir(tmp_path)
     boxes(tmp_path / "boxes.toml", {"a": 0, "b": 9, "c": 30})
