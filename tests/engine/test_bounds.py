@@ -235,10 +235,3 @@ def test_the_box_of_a_mesh_holds_the_round_surface_through_its_corners(height):
     low, high = ModelCache().model(mesh_shape(bar, "round")).bounds
     assert low[0] <= -5.0
     assert high[0] >= 5.0
-
-
-@pytest.mark.parametrize(("fit", "reach"), [("round", 10.0), ("off", 10.0 * math.cos(math.pi / 12))])
-def test_the_box_of_a_mesh_holds_the_cylinder_that_its_facets_stand_for(fit, reach):
-    facets = trimesh.creation.cylinder(10.0, 30.0, sections=12, transform=rotation((0, 0, 1), math.pi / 12))
-    bounds = ModelCache().model(mesh_shape(facets, fit)).bounds
-    assert bounds[:, 0] == pytest.approx([-reach, reach], abs=1e-9)

@@ -72,10 +72,12 @@ def test_the_faces_that_can_be_the_nearest_are_those_whose_triangles_are():
     assert near_faces(a, None, T) is None
 
 
-@pytest.mark.parametrize(("sides", "stands_out"), [(24, True), (6, True), (5, False)])
-def test_round_faces_through_the_corners_stand_out_of_their_facets_by_a_sagitta(sides, stands_out):
+@pytest.mark.parametrize(
+    ("sides", "fit", "stands_out"), [(24, "round", True), (6, "round", True), (5, "round", False), (24, "off", False)]
+)
+def test_round_faces_through_the_corners_stand_out_of_their_facets_by_a_sagitta(sides, fit, stands_out):
     """Facets that turn by more than 65 degrees are no round face; the box is larger by the stated error besides."""
-    bar = mesh_shape(trimesh.creation.cylinder(4.0, 10.0, sections=sides), "round", error=0.25)
+    bar = mesh_shape(trimesh.creation.cylinder(4.0, 10.0, sections=sides), fit, error=0.25)
     more = 0.25 + stands_out * 4.0 * (1.0 - math.cos(math.pi / sides))
     assert MODELS.model(bar).bounds == pytest.approx(surface(bar).box + np.array([[-more], [more]]))
 
