@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clamp3d import Motion, Scene, check, distance, distances, first_contact
+from clamp3d.engine import moving_pair
 from clamp3d.files.solid import BrepSolid
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import SweptArc, box, cylinder, groove_block, sphere
@@ -38,7 +39,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(x=places, radius=radii, turn=poses)
 def test_a_sphere_is_as_near_as_its_centre_less_its_radius(name, x, radius, turn):
     other, to_point = OTHERS[name]
@@ -77,8 +78,9 @@ def test_the_verdict_of_a_large_sphere_is_certain(gap, verdict):
 
 
 @pytest.mark.parametrize("radius", [None, 28.0, 23.5])
-def test_the_first_contact_of_a_sphere_is_that_of_its_centre(radius):
+def test_the_first_contact_of_a_sphere_is_that_of_its_centre(radius, monkeypatch):
     """Along a line, or on a circle, past a post; the smaller circle passes 0.5 mm away from it."""
+    monkeypatch.setattr(moving_pair, "BUDGET", 500)  # the last digits of that distance take all there is
     post, ball = cylinder(4.0, 60.0), sphere(3.0)
     if radius is None:
         hit = first_contact(post, ball, Motion.translate((40, 0, 0)), translation(-20.0, 2.0, 5.0))
