@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 
 from clamp3d import Scene
 from clamp3d.engine.check import check
+from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.surface import Surface
+from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry import shapes
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.profile import Profile
 from clamp3d.kernel import rotation, translation
 from clamp3d.shapes import SweptArc, make_mesh, mesh
+from tests.cad import first_solid
 
 TURNED = translation(1.0, -2.0, 0.5) @ rotation((1.0, 2.0, 3.0), 0.7)
 """A pose that nothing is square to."""
@@ -62,6 +65,17 @@ def manifold_shape(made, fit="off", **more):
 def faceted_shape(solid, error, fit="off"):
     """The solid's mesh within ``error`` mm, corners on the true surface, as a shape."""
     return mesh_shape(mesh(solid, error), fit, name=solid.name)
+
+
+def cad_model(solid):
+    """The model of a solid of Open CASCADE, with counters of its own."""
+    return model_of(BrepSolid.of(first_solid(solid), "solid"), Counters())
+
+
+def cad_scene(a, b, T=None):
+    """Two solids of Open CASCADE as parts "a" and "b", the second at ``T``."""
+    first, second = (BrepSolid.of(first_solid(solid), "solid") for solid in (a, b))
+    return Scene().add("a", first).add("b", second, T)
 
 
 def pose(axis, angle, place):

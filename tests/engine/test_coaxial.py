@@ -7,22 +7,18 @@ from clamp3d.engine import depth
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.judge import judge
-from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.refine import from_boxes
 from clamp3d.engine.verdict import Thresholds, Verdict
 from clamp3d.files.open_cascade import occ
 from clamp3d.files.solid import BrepSolid
 from tests.cad import block, cut, first_solid, moved, random_pose, ring, rod, shift
+from tests.kinds import cad_model as model
 from tests.public.placed_pairs import FAMILIES
 
 THRESHOLDS = Thresholds()
 COAXIAL = ["tube_in_tube", "taper_in_hub", "ring_in_groove", "ring_on_shaft", "ball_in_ring", "ring_on_plate"]
 GAPS = (-0.0101, -0.0099, 1e-4, 0.0099, 0.0101, 0.3)
 AT_ORIGIN = np.eye(4)
-
-
-def model(solid):
-    return model_of(BrepSolid.of(first_solid(solid), "part"), Counters())
 
 
 def is_decided(distance):

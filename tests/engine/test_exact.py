@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
-from clamp3d import Scene, check
+from clamp3d import check
 from clamp3d.engine import depth as depth_module
 from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
@@ -36,6 +36,7 @@ from clamp3d.geometry.motion import Motion
 from clamp3d.geometry.pose import to_target
 from clamp3d.geometry.shapes import sphere
 from tests.cad import ball, block, common_volume, cone, cut, first_solid, moved, ring, rod, shift, turn
+from tests.kinds import cad_model, cad_scene
 from tests.public.placed_pairs import placed_pair, random_pose
 
 FAMILIES = ("balls", "ball_on_plate", "ball_in_ring", "rods_crossed", "pin_off_centre", "box_on_its_corner")
@@ -48,7 +49,7 @@ def models(family, gap, seed=3, splines=0.0):
 
 
 def models_of(*solids):
-    return [model_of(BrepSolid.of(first_solid(solid), "solid"), Counters()) for solid in solids]
+    return [cad_model(solid) for solid in solids]
 
 
 @pytest.mark.parametrize("share", [0.5, 0.04])
@@ -91,9 +92,7 @@ def test_where_no_meshes_overlap_the_depth_is_that_of_a_point_and_no_way_out_is_
 @pytest.mark.parametrize("family", ["cones_side_by_side", "ball_in_cone"])
 def test_where_every_distance_is_measured_depths_of_oblique_contacts_are_tighter(family):
     pair = placed_pair(family, np.random.default_rng(3), -0.04, splines=0.0)
-    scene = Scene()
-    for name, solid in (("a", pair.a), ("b", pair.b)):
-        scene = scene.add(name, BrepSolid.of(first_solid(solid), name))
+    scene = cad_scene(pair.a, pair.b)
     (usual,), (thorough,) = (check(scene, distances=measured).pairs for measured in (False, True))
     loose, tight = usual.distance, thorough.distance
     assert loose.lower - 1e-6 <= tight.lower <= -0.04 <= tight.upper <= loose.upper + 1e-6
@@ -106,17 +105,15 @@ def test_a_shared_volume_holds_where_open_cascade_integrates_badly():
     squeeze.SetValue(1, 1, 1.7)
     squeeze.SetValue(2, 2, 0.6)
     tube = cut(rod(10.0, 0.0, 6.0), rod(7.0, -5.0, 11.0, 1.0))
-    tube = first_solid(occ.BRepBuilderAPI_GTransform(tube, squeeze, True).Shape())
-    scene = Scene().add("block", BrepSolid.of(block((-50, -50, -50), (50, 50, 50)), "block"))
-    (row,) = check(scene.add("tube", BrepSolid.of(tube, "tube"))).pairs
+    tube = occ.BRepBuilderAPI_GTransform(tube, squeeze, True).Shape()
+    (row,) = check(cad_scene(block((-50, -50, -50), (50, 50, 50)), tube)).pairs
     low, high = row.where.volume
     assert low <= 1.7 * 0.6 * np.pi * (10.0**2 - 7.0**2) * 6.0 <= high <= 1.02 * low
 
 
 @pytest.mark.parametrize("gap", [-8.0, -0.5])
 def test_a_deep_overlap_is_measured_on_coarse_meshes(gap):
-    solids = (ball(12.0), moved(ball(12.0), shift(24.0 + gap)))
-    a, b = (model_of(BrepSolid.of(solid, "x"), Counters()) for solid in solids)
+    a, b = models_of(ball(12.0), moved(ball(12.0), shift(24.0 + gap)))
     penetration(a, b, np.eye(4), refine(a, b, np.eye(4), Distance(), lambda d: d.upper < 0.0))
     assert a.counters.built["meshes"] == b.counters.built["meshes"] == 2
 
@@ -125,7 +122,7 @@ def test_a_deep_overlap_is_measured_on_coarse_meshes(gap):
 @pytest.mark.parametrize("family", ["balls", "ball_on_plate", "rods_crossed", "box_on_its_corner"])
 def test_a_depth_is_that_of_the_formula_and_its_translation_parts_the_solids(family, gap):
     pair = placed_pair(family, np.random.default_rng(4), gap, splines=0.0)
-    a, b = (model_of(BrepSolid.of(solid, "x"), Counters()) for solid in (pair.a, pair.b))
+    a, b = models_of(pair.a, pair.b)
     distance = penetration(a, b, np.eye(4), Distance(-np.inf, -0.01))
     assert distance.lower - 2e-6 <= gap <= distance.upper + 2e-6
     assert distance.upper - distance.lower <= 0.01 * -gap
@@ -220,8 +217,7 @@ def test_what_is_measured_does_not_depend_on_meshes_that_were_made_before(spline
         end = moved(rod(20.0, -10.0, 0.0), turn((0, 0, 1), angle))
         if splines:
             end = occ.BRepBuilderAPI_NurbsConvert(end, True).Shape()
-        solids = [BrepSolid.of(first_solid(solid), "solid") for solid in (end, cube)]
-        (row,) = check(Scene().add("rod", solids[0]).add("cube", solids[1])).pairs
+        (row,) = check(cad_scene(end, cube)).pairs
         assert row.verdict.value == "contact"
         assert row.distance.lower <= 0.009 <= row.distance.upper <= 0.00901
 
@@ -248,7 +244,7 @@ def test_between_the_corners_of_its_triangles_a_border_may_be_deepest(share, mos
     """The overlap of two plates drilled alike: on the border of every face both plates end, by the walls of a hole."""
     a, b = models("plates_drilled_alike", -0.006)
     for T in (np.eye(4), random_pose(np.random.default_rng(1))):
-        turned = model_of(BrepSolid.of(moved(from_bytes(b.exact.brep), np.linalg.inv(T)), "b"), Counters())
+        turned = cad_model(moved(from_bytes(b.exact.brep), np.linalg.inv(T)))
         distance = exact_overlap(a, turned, T, share)
         assert -most <= distance.lower <= -0.006 <= distance.upper <= -0.00599
 
@@ -567,8 +563,7 @@ def test_a_shallow_lens_has_its_volume_within_the_bounds_and_its_rim_in_the_box(
 
 def test_the_point_of_an_overlap_lies_in_both_parts():
     outer, inner = cut(rod(43.2, -20, 20), rod(43.0, -21, 21)), cut(rod(43.014, -25, 25), rod(42.5, -26, 26))
-    shapes = [BrepSolid.of(first_solid(solid), "tube") for solid in (outer, inner)]
-    (row,) = check(Scene().add("outer", shapes[0]).add("inner", shapes[1], turn((0, 0, 1), 0.02))).pairs
+    (row,) = check(cad_scene(outer, inner, turn((0, 0, 1), 0.02))).pairs
     assert row.verdict.value == "clash"
     assert 43.0 - 1e-5 <= np.hypot(*row.where.point[:2]) <= 43.014 + 1e-5
 
@@ -735,9 +730,8 @@ def test_a_search_that_needs_common_parts_ends_after_fewer_times(monkeypatch):
 
 def test_a_ball_that_falls_through_a_ring_touches_it_when_its_centre_tells():
     """Between steps Open CASCADE's tolerance is all that can be known, and fine meshes of the ring take too long."""
-    ring_and_ball = [BrepSolid.of(first_solid(solid), "solid") for solid in (ring(20.0, 8.0), ball(0.5))]
-    scene = Scene().add("ring", ring_and_ball[0]).add("ball", ring_and_ball[1], shift(20.0, 0.0, 20.0))
-    (row,) = check(scene.with_motion(Motion.translate((0.0, 0.0, -40.0), parts="ball"))).motions
+    scene = cad_scene(ring(20.0, 8.0), ball(0.5), shift(20.0, 0.0, 20.0))
+    (row,) = check(scene.with_motion(Motion.translate((0.0, 0.0, -40.0), parts="b"))).motions
     assert row.verdict.value == "clash"
     latest = (20.0 - 8.0 - 0.5 - 0.010001) / 40.0
     assert latest - 1e-6 < row.contact_at <= latest

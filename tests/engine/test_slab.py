@@ -5,19 +5,14 @@ import pytest
 
 pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
-from clamp3d.engine.model import Counters, model_of
 from clamp3d.engine.slab import slab_distance
 from clamp3d.files import cad_process
 from clamp3d.files.faces import OTHER
-from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.pose import inverse
-from tests.cad import ball, block, cone, cut, first_solid, moved, rod, shift, turn
+from tests.cad import ball, block, cone, cut, moved, rod, shift, turn
 from tests.files.assemblies import fuse
+from tests.kinds import cad_model as model
 from tests.public.placed_pairs import placed_pair, random_pose
-
-
-def model(solid):
-    return model_of(BrepSolid.of(first_solid(solid), "solid"), Counters())
 
 
 def lowers(a, b, T):
