@@ -72,9 +72,23 @@ def test_what_counts_as_known():
         assert refine.with_normal(other).normal is n
 
 
+@pytest.fixture
+def cad_levels(monkeypatch):
+    """Replaces levels of two solids from CAD: sections say nothing, and no solid is a ball."""
+
+    def replaced(deep=5.0, **others):
+        answers = {"coaxial_distance": lambda *_: None, "_may_be_ball": lambda _: False}
+        answers["exact_distance"] = lambda *_: Distance(method="distance")
+        answers["exact_probe"] = lambda *_: Distance(-math.inf, -deep, method="probe")
+        for name, answer in (answers | others).items():
+            monkeypatch.setattr(cad_pair, name, answer)
+
+    return replaced
+
+
 @pytest.mark.parametrize("found", [True, False])
 @pytest.mark.parametrize("deep", [5.0, 2e-4, 1e-4, 0.0, -math.inf])
-def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, deep):
+def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatch, found, deep):
     """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more."""
 
     def overlap(a, b, T, share, *, end, quick=False, attested):
@@ -84,14 +98,9 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
     def meshes(a, b, T, chord, enough, *, thorough=False, cuts=None):
         return Distance(method=f"{chord} {['thorough'] * thorough}")
 
-    monkeypatch.setattr(cad_pair, "meshes_distance", meshes)
-    monkeypatch.setattr(cad_pair, "slab_distance", lambda *_: Distance(method="slab"))
-    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: Distance(method="sections"))
-    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -deep, method="probe"))
-    monkeypatch.setattr(cad_pair, "exact_overlap", overlap)
+    slab, sections = (lambda *_, by=by: Distance(method=by) for by in ("slab", "sections"))
+    cad_levels(deep, meshes_distance=meshes, slab_distance=slab, coaxial_distance=sections, exact_overlap=overlap)
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
     begin, both = ["sections", "probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
@@ -114,16 +123,11 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(monkeypatch, found, de
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
 
 
-def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshes_that_fail_say_nothing(monkeypatch):
+def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshes_that_fail_say_nothing(cad_levels):
     def fails(*_, **__):
         raise SolverError("no answer in 20 s")
 
-    monkeypatch.setattr(cad_pair, "meshes_distance", fails)
-    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
-    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
-    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
-    monkeypatch.setattr(cad_pair, "exact_overlap", lambda a, b, T, share, **_: Distance(method=f"{share}"))
+    cad_levels(meshes_distance=fails, exact_overlap=lambda a, b, T, share, **_: Distance(method=f"{share}"))
 
     class Unmeshed(SimpleNamespace):
         fine_triangles = property(fails)
@@ -135,17 +139,13 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     assert all((answer.lower, answer.upper) == (-math.inf, math.inf) for answer in answers[1:])
 
 
-def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(monkeypatch):
+def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(cad_levels):
     made = []
 
     class Formed(SimpleNamespace):
         quick_bodies = property(made.append)
 
-    monkeypatch.setattr(cad_pair, "coaxial_distance", lambda *_: None)
-    monkeypatch.setattr(cad_pair, "_may_be_ball", lambda _: False)
-    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: Distance(method="distance"))
-    monkeypatch.setattr(cad_pair, "exact_probe", lambda *_: Distance(-math.inf, -5.0, method="probe"))
-    monkeypatch.setattr(cad_pair, "exact_overlap", lambda *_, **__: Distance(-5.0, method="common part"))
+    cad_levels(exact_overlap=lambda *_, **__: Distance(-5.0, method="common part"))
     a = Formed(exact=1, is_simple=True, chords=())
     answers = refine._levels(a, a, np.eye(4), lambda _: False, False)
     before = [next(answers)[1].method for _ in range(4)]
