@@ -30,10 +30,9 @@ def boxes(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["path", "list", "meshes", "trimesh", "scene"])
-def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path, request):
+@pytest.mark.usefixtures("without_pictures")
+def test_every_source_is_taken_by_all_four(boxes, kind, tmp_path):
     source = boxes[kind]
-    if kind not in ("path", "scene"):  # a mesh and a drawn part are seen in pictures
-        request.getfixturevalue("without_pictures")
     result = clamp3d.check(source)
     (row,) = result.findings
     assert ({row.a, row.b}, str(row.verdict)) == ({"a", "b"}, "clash")
