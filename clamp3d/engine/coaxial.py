@@ -19,11 +19,11 @@ from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
-from clamp3d.files.turned import CHORD, PLANE_AT, Section, axis_of, turned_about
+from clamp3d.files.turned import PLANE_AT, Section, axis_of, turned_about
 from clamp3d.geometry.manifolds import arrays_of, prism
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target, translation
 
-METHOD = f"coaxial sections, Open CASCADE, tolerance {TOLERANCE:g} mm, chord error {CHORD:g} mm"
+METHOD = f"coaxial sections, Open CASCADE, tolerance {TOLERANCE:g} mm"
 _HALF = 5.0
 """Half of the length (mm) of the prisms that stand for sections: depths up to this are those of the sections."""
 
@@ -51,21 +51,25 @@ def _about_axis(turned: Model, other: Model, T: Array, enough: Enough) -> Distan
     if own_axis is None:  # of planes alone
         own_axis = there
     try:
-        own = cad_process.turned_section(turned.exact.brep, axis.tobytes(), 0.0)
-        if own is None or own.reach < np.inf:
+        own = cad_process.turned_sections(turned.exact.brep, axis.tobytes(), 0.0)
+        if not own or own[-1].reach < np.inf:
             return None
         # About the axis as its file has it: by one that is off in the last digits Open CASCADE finds no circles.
-        around = cad_process.turned_section(other.exact.brep, own_axis.tobytes(), own.radius)
+        around = cad_process.turned_sections(other.exact.brep, own_axis.tobytes(), own[-1].radius)
     except Clamp3dError:
         return None
-    if around is None:
+    if not around:
         return None
     T_sections = translation(0.0, float(to_source(there, own_axis[:3, 3])[2]), 0.0)
-    margin = around.reach - own.radius  # so far is what of the other solid is in no section
-    distance = _sections_distance(own, around, T_sections, enough)
-    # A section ends at its reach, and a prism at its ends: what is deeper may lie further from the solid's surface.
-    lower = min(distance.lower, margin) if distance.lower > -min(margin, _HALF) else -np.inf
-    return replace(distance, lower=lower, method=METHOD).moved(axis @ PLANE_AT)
+    margin = around[-1].reach - own[-1].radius  # so far is what of the other solid is in no section
+    for section, other_section in zip(own, around, strict=True):
+        distance = _sections_distance(section, other_section, T_sections, enough)
+        # A section ends at its reach, and a prism at its ends: what is deeper may lie further from the solid's surface.
+        lower = min(distance.lower, margin) if distance.lower > -min(margin, _HALF) else -np.inf
+        distance = replace(distance, lower=lower, method=f"{METHOD}, chord error {section.chord:g} mm")
+        if enough(distance):
+            break
+    return distance.moved(axis @ PLANE_AT)
 
 
 def _sections_distance(a: Section, b: Section, T: Array, enough: Enough) -> Distance:

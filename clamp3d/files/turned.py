@@ -16,8 +16,8 @@ from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 from clamp3d.geometry.profile import chord_angle, chord_count
 from clamp3d.geometry.triangles import distances_from_segments
 
-CHORD = 1e-5
-"""Chord error (mm) of sections: of curves in a plane it takes no more than thousands of corners."""
+CHORDS = (1e-3, 1e-5)
+"""Chord errors (mm) of sections: the first decides most fits, in a tenth of the time that the last takes."""
 _ALIKE, _PARALLEL = 1e-7, 1e-9
 """How far (mm, rad) a surface may be from one that is turned about the axis, as Open CASCADE confuses points."""
 _ANGLES = (1.0, 2.2)
@@ -47,11 +47,13 @@ class Section:
 
     What is inside of an odd number of loops is material. ``error``: how far (mm) they are off the true ones.
     ``reach``: all planes give the same nearer to the axis than this, mm; what is farther is left out.
+    ``chord``: that of `CHORDS` with which circles are drawn.
     """
 
     loops: tuple[Array, ...]
     error: float
     reach: float
+    chord: float
 
     @property
     def radius(self) -> float:
@@ -87,8 +89,8 @@ def turned_about(form: Surfaces, axis: Array) -> NDArray[np.bool_]:
 
 
 @lru_cache(maxsize=512)
-def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
-    """The section of a solid about z of a pose (4, 4), in bytes, as far as it is turned about that.
+def turned_sections(brep: bytes, pose: bytes, radius: float) -> tuple[Section, ...]:
+    """The section of a solid about z of a pose (4, 4), in bytes, as far as it is turned about that, with each chord.
 
     None where it is not so far as ``radius`` (mm), and where Open CASCADE's sections are not what they should be.
     """
@@ -98,21 +100,21 @@ def turned_section(brep: bytes, pose: bytes, radius: float) -> Section | None:
     is_turned = turned_about(form, axis)
     reach = _reach(solid, is_turned, radius)
     if reach <= radius:
-        return None
+        return ()
     low, high = bounds_of(solid, quick=True)
     wide = min(reach, math.hypot(*np.maximum(high, -low)[:2]) + _BEYOND)
     circles = _circles(form, is_turned, axis)
-    sections = []
-    for angle in _ANGLES:
-        cut = _cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND)
-        loops = tuple(_loop(wire, angle, circles) for wire in explore(cut, "WIRE"))
-        sections.append((loops, area_of(cut, adaptive=True)))
-    (loops, area), (others, _) = sections
-    lost = CHORD * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops)
+    cut, other = (_cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND) for angle in _ANGLES)
+    chord = CHORDS[-1]
+    loops, others = (_loops(x, angle, circles, chord) for x, angle in zip((cut, other), _ANGLES, strict=True))
+    area, lost = (
+        area_of(cut, adaptive=True),
+        chord * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops),
+    )
     is_whole = area > 0.0 and abs(_area(loops) - area) <= lost + _APPROXIMATE * area
     if not (is_whole and abs(_area(loops) - _area(others)) <= lost):
-        return None
-    return Section(loops, CHORD + TOLERANCE, reach)
+        return ()
+    return tuple(Section(_loops(cut, _ANGLES[0], circles, e), e + TOLERANCE, reach, e) for e in CHORDS)
 
 
 def _reach(solid: Any, is_turned: NDArray[np.bool_], radius: float) -> float:
@@ -153,7 +155,12 @@ def _circles(form: Surfaces, is_turned: NDArray[np.bool_], axis: Array) -> Array
     return np.concatenate(circles)
 
 
-def _loop(wire: Any, angle: float, circles: Array) -> Array:
+def _loops(cut: Any, angle: float, circles: Array, chord: float) -> tuple[Array, ...]:
+    """The outlines of a section at an ``angle`` (rad), with circles drawn within ``chord`` mm."""
+    return tuple(_loop(wire, angle, circles, chord) for wire in explore(cut, "WIRE"))
+
+
+def _loop(wire: Any, angle: float, circles: Array, chord: float) -> Array:
     """Points (n, 2) along a wire of the section at an ``angle``; none if it is not of lines and some of ``circles``.
 
     Open CASCADE gives curves that are a circle's but for the last digits as splines, 1e-6 mm off.
@@ -167,12 +174,12 @@ def _loop(wire: Any, angle: float, circles: Array) -> Array:
         if edge.Orientation() == occ.TopAbs_Orientation.TopAbs_REVERSED:
             at = at[::-1]
         places = np.array([curve.Value(t).Coord() for t in at.tolist()]) @ across
-        points.append(_without_end(places, circles))
+        points.append(_without_end(places, circles, chord))
         walk.Next()
     return np.concatenate(points) if all(map(len, points)) else np.empty((0, 2))
 
 
-def _without_end(places: Array, circles: Array) -> Array:
+def _without_end(places: Array, circles: Array, chord: float) -> Array:
     """Points (n, 2), all but the last, on the line or circle through some of it (k, 2); none if it is neither."""
     if distances_from_segments(places, places[0], places[-1]).max() <= _OFF:
         return places[:1]
@@ -182,7 +189,7 @@ def _without_end(places: Array, circles: Array) -> Array:
         return places[:0]
     centre, radius = centres[off.argmin()], radii[off.argmin()]
     turns = np.unwrap(np.arctan2(*(places - centre).T[::-1]))
-    count = chord_count(turns[-1] - turns[0], chord_angle(radius, CHORD))
+    count = chord_count(turns[-1] - turns[0], chord_angle(radius, chord))
     at = np.linspace(turns[0], turns[-1], count + 1)[:-1]
     return np.asarray(centre + radius * np.column_stack([np.cos(at), np.sin(at)]))
 
