@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.exact import SHARES, exact_distance, exact_overlap, exact_probe
-from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance
-from clamp3d.engine.model import CAD_CHORDS, QUICK_TRIANGLES, Model
+from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance, surface_distance
+from clamp3d.engine.model import CAD_CHORDS, MOST_FINE, QUICK_TRIANGLES, Model
+from clamp3d.engine.near_faces import faces_nearby
 from clamp3d.engine.slab import slab_distance
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import SPHERE
+from clamp3d.files.open_cascade import TOLERANCE
+from clamp3d.geometry.mesh import IntArray
 from clamp3d.geometry.pose import Array
 
 Levels = Iterator[tuple[str, Distance]]
@@ -34,16 +38,15 @@ class CadPair:
 
     def __init__(self, a: Model, b: Model, T: Array, enough: Enough) -> None:
         self.a, self.b, self.T, self.enough = a, b, T, enough
-        self._chords = [chord for chord in a.chords if chord in b.chords]
-        self._has_fine_meshes = len(self._chords) > 1
-        self._is_small = self._has_fine_meshes and a.fine_triangles + b.fine_triangles <= QUICK_TRIANGLES
+        self._has_meshes = bool(a.chords and b.chords)
+        self._has_asked_fine_meshes = False
         self._has_common_part = False
         self._attested = 0.0
 
     def levels(self, closed_forms: Levels) -> Levels:
         """All levels; ``closed_forms`` come after those that take less time."""
-        if self._chords:
-            yield "meshes", self._meshes(self._chords[0])
+        if self._has_meshes:
+            yield "meshes", meshes_distance(self.a, self.b, self.T, CAD_CHORDS[0], self.enough, FEW_CUTS)
             slab = slab_distance(self.a, self.b, self.T, self.enough)
             if slab is not None:
                 yield "boxes", slab
@@ -52,46 +55,58 @@ class CadPair:
             yield "sections", sections
         yield from self._nearest()
         if self._attested <= _COINCIDENT:
-            yield from self._fine_meshes(quick=True)
+            yield from self._fine_meshes(QUICK_TRIANGLES)
         yield from self._common_part(quick=True)
         yield from closed_forms
-        yield from self._fine_meshes(quick=True)
+        yield from self._fine_meshes(MOST_FINE)
         yield from self._common_part(quick=False)
-        yield from self._fine_meshes(quick=False)
-        if CAD_CHORDS[-1] not in self._chords:  # Open CASCADE did not find the common part
-            yield "meshes", self._meshes(CAD_CHORDS[-1], thorough=True)
+        if not self._has_asked_fine_meshes:  # Open CASCADE did not find the common part
+            yield "meshes", self._fine_meshes_distance(CUTS)
 
     def _nearest(self) -> Levels:
         """What some points attest, and Open CASCADE's distance, which is bound by what contradicts it now and then."""
         probe = exact_probe(self.a, self.b, self.T)
         yield "exact", probe
         self._attested = -probe.upper
-        if probe.upper < 0.0 and not (_may_be_ball(self.a) or _may_be_ball(self.b)):
-            return  # they overlap: of other bodies than balls Open CASCADE would say 0
+        if probe.upper <= TOLERANCE and not (_may_be_ball(self.a) or _may_be_ball(self.b)):
+            return  # they touch or overlap: of other bodies than balls Open CASCADE would say 0
         distance = exact_distance(self.a, self.b, self.T)
         unproven = replace(distance, lower=-np.inf)
         if distance.lower > probe.upper:  # a point lies in both solids
             distance = unproven
-        may_be_checked = bool(self._chords) and np.isfinite(distance.lower)
+        may_be_checked = self._has_meshes and np.isfinite(distance.lower)
         if not (may_be_checked and (self.a.is_free_form or self.b.is_free_form)):
             yield "exact", distance
             return
         # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
         yield "exact", unproven
-        if self._is_small:
-            chord, self._has_fine_meshes = self._chords[-1], False
+        if max(self._fine_triangles) <= MOST_FINE:
+            self._has_asked_fine_meshes = True
+            meshes = self._fine_meshes_distance(FEW_CUTS)
         else:
-            chord = max(self.a.fine_chord, self.b.fine_chord)
-        meshes = self._meshes(chord)
+            meshes = meshes_distance(self.a, self.b, self.T, CAD_CHORDS[0], self.enough, FEW_CUTS)
         yield "meshes", meshes
         if distance.lower <= meshes.upper:
             yield "exact", distance
 
-    def _fine_meshes(self, *, quick: bool) -> Levels:
-        """What fine meshes say, once; ``quick``: only where that takes less time than Open CASCADE."""
-        if self._has_fine_meshes and (self._is_small or not quick):
-            self._has_fine_meshes = False
-            yield "meshes", self._meshes(self._chords[-1])
+    @cached_property
+    def _nearby(self) -> tuple[IntArray, IntArray]:
+        """The faces of both solids that are near the other one."""
+        assert self.a.face_meshes is not None
+        assert self.b.face_meshes is not None
+        return faces_nearby(self.a.face_meshes, self.b.face_meshes, self.T)
+
+    @cached_property
+    def _fine_triangles(self) -> tuple[float, float]:
+        """About how many triangles meshes of both solids have that are fine there."""
+        near_a, near_b = self._nearby
+        return self.a.fine_triangles_near(near_a), self.b.fine_triangles_near(near_b)
+
+    def _fine_meshes(self, most: float) -> Levels:
+        """What fine meshes say, once, if they have no more than ``most`` triangles each."""
+        if not self._has_asked_fine_meshes and self._has_meshes and max(self._fine_triangles) <= most:
+            self._has_asked_fine_meshes = True
+            yield "meshes", self._fine_meshes_distance(FEW_CUTS)
 
     def _common_part(self, *, quick: bool) -> Levels:
         """What the common part says, from coarse samples to fine ones, which take longer: none after one that fails.
@@ -117,13 +132,18 @@ class CadPair:
 
         return exact_overlap(self.a, self.b, self.T, share, end=end, quick=quick, attested=self._attested)
 
-    def _meshes(self, chord: float, *, thorough: bool = False) -> Distance:
-        """What meshes say; nothing where they take too long to make."""
-        cuts = CUTS if thorough else FEW_CUTS
+    def _fine_meshes_distance(self, cuts: int) -> Distance:
+        """What meshes say that are fine where the solids are near each other; nothing where they take too long."""
         try:
-            return meshes_distance(self.a, self.b, self.T, chord, self.enough, thorough=thorough, cuts=cuts)
+            if self._has_meshes:
+                near_a, near_b = self._nearby
+                a, b = self.a.outer_near(near_a), self.b.outer_near(near_b)
+            else:  # coarse ones do not close: fine ones may
+                a, b = (model.outer(CAD_CHORDS[-1], thorough=True) for model in (self.a, self.b))
         except Clamp3dError:
             return Distance(method="without fine meshes")
+        distance = surface_distance(a, b, self.T, self.enough, cuts)
+        return replace(distance, method=f"meshes (FCL), chord error {CAD_CHORDS[-1]:.2g} mm")
 
 
 def _may_be_ball(model: Model) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.farthest import Pieces, Sheet, farthest
+from clamp3d.engine.farthest import Pieces, farthest
 from clamp3d.engine.model import Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
@@ -169,8 +169,8 @@ def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Dista
 
 def _measured(own: Border, other: Border) -> Pieces:
     """How far one side of a border is from the other."""
-    sheet = Sheet(Surface(other.points, other.triangles), other.errors)
-    return Pieces.of(sheet, own.points[own.triangles], own.errors)
+    surface = Surface(other.points, other.triangles, other.errors, has_own_errors=True)
+    return Pieces.of(surface, own.points[own.triangles], own.errors)
 
 
 def _deepest_places(shared: CommonPart, sides: list[Pieces]) -> tuple[Array, Array]:
@@ -179,7 +179,7 @@ def _deepest_places(shared: CommonPart, sides: list[Pieces]) -> tuple[Array, Arr
     With some of all other corners; middles need not lie on the border.
     """
     corners = np.concatenate([border.points for border in shared.borders])
-    away = [side.sheet.surface.distance(border.points) for side, border in zip(sides, shared.borders, strict=True)]
+    away = [side.surface.distance(border.points) for side, border in zip(sides, shared.borders, strict=True)]
     order = np.argsort(-np.concatenate(away), kind="stable")
     spread = order[np.linspace(0, len(order) - 1, _PROBED).astype(int)]
     tried = np.unique(np.concatenate([order[:_PROBED], spread]))

@@ -30,22 +30,15 @@ End = Callable[[float, float], bool]
 """Whether a bound (mm) is sharp enough, or none can be, since each is at least the second number (mm)."""
 
 
-class Sheet(NamedTuple):
-    """A surface, and how far (m,) mm each of its triangles is off."""
-
-    surface: Surface
-    errors: Array
-
-
 class Pieces(NamedTuple):
-    """Triangles (m, 3, 3), each off by ``errors`` (m,) mm, and how far (mm) they are from a sheet.
+    """Triangles (m, 3, 3), each off by ``errors`` (m,) mm, and how far (mm) they are from a surface.
 
     ``middles`` (m,): their middles, from triangle ``nearest`` (m,); ``off`` (m,): the errors of both;
-    ``at_most`` (m,): any point of what they stand for, from what the sheet stands for; ``is_moved`` (m,): whether that
+    ``at_most`` (m,): any point of what they stand for, from what the surface is; ``is_moved`` (m,): whether that
     is the least of both bounds, not of the first alone, which is quicker.
     """
 
-    sheet: Sheet
+    surface: Surface
     triangles: Array
     errors: Array
     nearest: IntArray
@@ -55,22 +48,22 @@ class Pieces(NamedTuple):
     is_moved: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, sheet: Sheet, triangles: Array, errors: Array) -> Pieces:
-        """Measured, with the first bound: the distance from one triangle of the sheet."""
-        surface = sheet.surface
+    def of(cls, surface: Surface, triangles: Array, errors: Array) -> Pieces:
+        """Measured, with the first bound: the distance from one triangle of the surface."""
         middles, nearest, _ = surface.nearest(triangles.mean(axis=1))
-        off = errors + sheet.errors[nearest]
+        off = errors + surface.mutual_errors[nearest]
         chosen = np.repeat(surface.vertices[surface.faces[nearest]], 3, axis=0)
         corners = triangles.reshape(-1, 3)
         above = np.linalg.norm(closest_points(chosen, corners) - corners, axis=1).reshape(-1, 3).max(axis=1)
-        return cls(sheet, triangles, errors, nearest, middles, off, above + off, np.zeros(len(triangles), dtype=bool))
+        return cls(surface, triangles, errors, nearest, middles, off, above + off, np.zeros(len(triangles), dtype=bool))
 
     def moved(self, rows: IntArray) -> Pieces:
         """With the second bound of some of them: how long a move is that takes one out of the surface."""
-        surface, pieces, nearest = self.sheet.surface, self.triangles[rows], self.nearest[rows]
+        surface, pieces, nearest = self.surface, self.triangles[rows], self.nearest[rows]
         feet = closest_points(surface.vertices[surface.faces[nearest]], pieces.mean(axis=1))
         moves = _moves_beyond(surface, pieces, feet, surface.normals[nearest])
-        bound = np.linalg.norm(moves, axis=1) + self.errors[rows] + self.sheet.errors.max(initial=0.0)
+        length = np.linalg.norm(moves, axis=1)
+        bound = length + self.errors[rows] + surface.errors_within(pieces, length)
         kept = np.flatnonzero(bound < self.at_most[rows])
         if surface.has_sides:
             kept = kept[surface.is_outside(pieces[kept] + moves[kept, None])]
@@ -88,12 +81,12 @@ class Pieces(NamedTuple):
     def cut(self, rows: NDArray[np.bool_]) -> Pieces:
         """With some of them cut: along a border of the triangle nearest to them, or in half where all is above it."""
         new, source = self._cuts(np.flatnonzero(rows))
-        both = zip(self[1:], Pieces.of(self.sheet, new, self.errors[source])[1:], strict=True)
-        return Pieces(self.sheet, *(np.concatenate([own[~rows], added]) for own, added in both))
+        both = zip(self[1:], Pieces.of(self.surface, new, self.errors[source])[1:], strict=True)
+        return Pieces(self.surface, *(np.concatenate([own[~rows], added]) for own, added in both))
 
     def _cuts(self, rows: IntArray) -> tuple[Array, IntArray]:
         """Triangles (k, 3, 3) that pieces are cut into, and the row (k,) of the piece that each is of."""
-        pieces, nearest, surface = self.triangles[rows], self.nearest[rows], self.sheet.surface
+        pieces, nearest, surface = self.triangles[rows], self.nearest[rows], self.surface
         corners = surface.vertices[surface.faces[nearest]]
         inward = np.cross(surface.normals[nearest][:, None], np.roll(corners, -1, axis=1) - corners)
         inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-300)[:, :, None]
@@ -110,7 +103,7 @@ class Pieces(NamedTuple):
 
 
 def farthest(every: Sequence[Pieces], end: End, cuts: int) -> float:
-    """How far (mm) any point of pieces, each from its sheet, is at most, sharpened until the ``end``.
+    """How far (mm) any point of pieces, each from its surface, is at most, sharpened until the ``end``.
 
     Of each those whose bounds are largest are cut until they are sharp, or ``cuts`` triangles are added.
     """
@@ -140,7 +133,8 @@ def _farthest(pieces: Pieces, floor: float, end: End, cuts: int) -> float:
 def _moves_beyond(surface: Surface, triangles: Array, feet: Array, normals: Array) -> Array:
     """Moves (m, 3) that take triangles (m, 3, 3) beyond the planes through ``feet`` (m, 3), along their normals.
 
-    Lemma: a point is no further from a surface than it is moved to cross it, as who leaves a body does.
+    Lemma: a point is no further from a surface than it is moved to cross it, as who leaves a body does. If the surface
+    is off there, so much more: of its triangles those count that are no further from the point than it is moved.
     """
     height = np.einsum("mcj,mj->mc", feet[:, None] - triangles, normals).max(axis=1)
     height = np.maximum(height, 0.0) * (1.0 if surface.has_sides else _BENT)

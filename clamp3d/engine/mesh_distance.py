@@ -28,24 +28,20 @@ _HALVINGS = 30
 """Halvings of the way between two nearest points after which the true surface on it is known to rounding."""
 
 
-def meshes_distance(
-    a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool = False, cuts: int = CUTS
-) -> Distance:
+def meshes_distance(a: Model, b: Model, T: Array, error: float, enough: Enough, cuts: int = CUTS) -> Distance:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame, from meshes of chord error ``error`` mm.
 
     In an overlap the bounds are those of the interference: the greatest depth of a point of one body in the other. It
-    is bounded from above only where that can be ``enough``. ``thorough``: also where a solid's mesh is large then.
-    ``cuts``: triangles that those of an overlap are cut into beyond their number, to bound its thickness.
+    is bounded from above only where that can be ``enough``. ``cuts``: triangles that those of an overlap are cut into
+    beyond their number, to bound its thickness.
     """
     chord_error = f", chord error {error:.2g} mm" if a.refines or b.refines else ""
-    distance = _between_meshes(a, b, T, error, enough, thorough=thorough, cuts=cuts)
+    distance = _between_meshes(a, b, T, error, enough, cuts)
     return replace(distance, method=f"meshes (FCL){chord_error}")
 
 
-def _between_meshes(
-    a: Model, b: Model, T: Array, error: float, enough: Enough, *, thorough: bool, cuts: int
-) -> Distance:
-    outer_a, outer_b = (model.outer(error, thorough=thorough) for model in (a, b))
+def _between_meshes(a: Model, b: Model, T: Array, error: float, enough: Enough, cuts: int) -> Distance:
+    outer_a, outer_b = a.outer(error), b.outer(error)
     outer = surface_distance(outer_a, outer_b, T, enough, cuts)
     if not (a.bracketed or b.bracketed):
         return outer

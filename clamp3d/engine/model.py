@@ -9,7 +9,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,8 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
-from clamp3d.geometry.mesh import edges_of, is_closed
+from clamp3d.files.tessellation import COARSE, Tessellation
+from clamp3d.geometry.mesh import IntArray, edges_of, is_closed
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere, cylinder
@@ -43,8 +44,10 @@ def ignore(*_: object) -> None:
 
 _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
-_MOST_FINE = 80_000
+MOST_FINE = 80_000
 """Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
+_KEPT = 32
+"""Meshes that are fine near other solids which are kept: of poses along a motion most are the same."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 _SHARPEST = 0.02
@@ -56,7 +59,7 @@ QUICK_TRIANGLES = 15_000
 DRAWN_CHORDS = (0.5, 0.06, 0.008, 0.001)
 """Chord errors (mm) that drawn solids are meshed with; a pair still open at the last is uncertain."""
 
-CAD_CHORDS = (0.1, 0.0018)
+CAD_CHORDS = (COARSE, 0.0018)
 """Chord errors (mm) that solids from CAD are meshed with; what these leave open is asked of Open CASCADE.
 
 Of two equal cylinders, one in the other, facets overlap by a chord error, and each adds its own: three fine ones are
@@ -147,6 +150,14 @@ class Model:
     @property
     def fine_triangles(self) -> float:
         """About how many triangles a fine mesh of a solid from CAD has."""
+        raise NotImplementedError
+
+    def fine_triangles_near(self, faces: IntArray) -> float:
+        """The same of a mesh that is fine on some of its faces, numbered (k,)."""
+        raise NotImplementedError
+
+    def outer_near(self, faces: IntArray) -> Surface:
+        """Mesh of a solid from CAD that is fine on some of its faces, numbered (k,), and coarse elsewhere."""
         raise NotImplementedError
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
@@ -269,7 +280,7 @@ class CadModel(Model):
             return ()
         if not is_closed(coarse.faces):
             return ()
-        return CAD_CHORDS if self.fine_triangles <= _MOST_FINE else CAD_CHORDS[:1]
+        return CAD_CHORDS if self.fine_triangles <= MOST_FINE else CAD_CHORDS[:1]
 
     @cached_property
     def fine_chord(self) -> float:
@@ -283,14 +294,33 @@ class CadModel(Model):
 
     @cached_property
     def fine_triangles(self) -> float:
-        """About how many triangles a fine mesh has, from the errors of the coarse one.
+        """About how many triangles a fine mesh has."""
+        return self.fine_triangles_near(np.arange(len(self.shape.surfaces.kind)))
+
+    def fine_triangles_near(self, faces: IntArray) -> float:
+        """The same of a mesh that is fine on some of its faces, from the errors of the coarse one.
 
         On planes, cylinders and cones the error of a triangle is as its width squared, elsewhere as its area.
         """
         coarse = self.shape.tessellated(CAD_CHORDS[0])
         finer = np.maximum(coarse.errors / CAD_CHORDS[-1], 1.0)
         one_way = self.shape.surfaces.kind[coarse.face] <= CONE
-        return float(np.where(one_way, np.sqrt(finer), finer).sum())
+        each = np.where(one_way, np.sqrt(finer), finer)
+        return float(np.where(np.isin(coarse.face, faces), each, 1.0).sum())
+
+    def outer_near(self, faces: IntArray) -> Surface:
+        """Mesh that is fine on some of its faces, numbered (k,), and coarse elsewhere; Clamp3dError if it has gaps."""
+        if self._is_small:
+            return self.outer(CAD_CHORDS[-1], thorough=True)
+        mesh = _fine_mesh(self.shape, tuple(faces.tolist()))
+        self.counters.built["meshes"] += 1
+        self.counters.built["triangles"] += len(mesh.faces)
+        return mesh
+
+    @cached_property
+    def _is_small(self) -> bool:
+        """Whether a fine mesh of all of it, which all pairs share, is worth more than one of some faces for each."""
+        return self.fine_triangles <= QUICK_TRIANGLES
 
     @cached_property
     def bodies(self) -> Forms | None:
@@ -327,10 +357,20 @@ class CadModel(Model):
         return cad_process.depths(self.shape.brep, points)
 
     def _surface(self, chord: float, inside: bool) -> Surface:
-        mesh = self.shape.tessellated(chord)
-        if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
-            raise Clamp3dError(f"the triangles of {self.name} do not close")
-        return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
+        return _closed(self.shape, self.shape.tessellated(chord))
+
+
+def _closed(shape: BrepSolid, mesh: Tessellation) -> Surface:
+    """The triangles of a solid. Raises Clamp3dError if they do not close, as coarse ones do, or no finer are asked."""
+    if not is_closed(mesh.faces):
+        raise Clamp3dError(f"the triangles of {shape.name} do not close")
+    return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
+
+
+@lru_cache(maxsize=_KEPT)
+def _fine_mesh(shape: BrepSolid, faces: tuple[int, ...]) -> Surface:
+    """The triangles of a solid that are fine on some of its faces."""
+    return _closed(shape, shape.tessellated_near(faces, CAD_CHORDS[-1]))
 
 
 class MeshModel(Model):

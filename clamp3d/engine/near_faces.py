@@ -1,4 +1,4 @@
-"""Which faces of two solids from CAD can be the nearest, by their coarse triangles: others need no exact distance."""
+"""Which faces of two solids from CAD can be the nearest, by their coarse triangles: others need no closer look."""
 
 from __future__ import annotations
 
@@ -34,7 +34,11 @@ class FaceMeshes:
     @cached_property
     def boxes(self) -> Array:
         """Lower and upper corners (2, n, 3) of the faces' triangles."""
-        corners = self.surface.vertices[self.surface.faces]
+        return self._boxes_at(np.eye(4))
+
+    def _boxes_at(self, T: Array) -> Array:
+        """The same with the solid placed by ``T`` (4, 4)."""
+        corners = to_target(T, self.surface.vertices)[self.surface.faces]
         order = np.argsort(self.face, kind="stable")
         first = np.searchsorted(self.face[order], self.numbers)
         low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
@@ -46,30 +50,35 @@ class FaceMeshes:
             self._trees[number] = fcl_tree(self.surface.vertices, self.surface.faces[self.face == number])
         return self._trees[number]
 
-    def near(self, other: Surface, T: Array, limit: float) -> Faces:
-        """The faces (k,) that are not certainly more than ``limit`` mm from another mesh placed by ``T`` (4, 4)."""
-        points = to_target(T, other.vertices)
-        low, high = self.boxes
-        gap = np.linalg.norm(np.maximum(np.maximum(low - points.max(axis=0), points.min(axis=0) - high), 0.0), axis=1)
-        rows = self.numbers[gap <= limit].tolist()
-        return np.array([k for k in rows if tree_distance(self.tree(k), other.bvh, T) <= limit], dtype=np.int64)
+    def near(self, other: FaceMeshes, T: Array, limit: float) -> Faces:
+        """The faces (k,) that are not certainly more than ``limit`` mm from another solid's, placed by ``T`` (4, 4)."""
+        low, high = other._boxes_at(T)
+        gaps = (
+            np.maximum(np.maximum(low - own_high, own_low - high), 0.0)
+            for own_low, own_high in zip(*self.boxes, strict=True)
+        )
+        may_be_near = [bool((np.linalg.norm(gap, axis=1) <= limit).any()) for gap in gaps]
+        rows = self.numbers[may_be_near].tolist()
+        tree = other.surface.bvh
+        return np.array([k for k in rows if tree_distance(self.tree(k), tree, T) <= limit], dtype=np.int64)
 
 
 def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Faces, Faces] | None:
     """The faces of two solids that can hold nearest points of their surfaces, ``b`` at ``T`` (4, 4) in a's frame.
 
-    None where triangles are missing, where there are few faces in all, where triangles meet (Open CASCADE soon finds a
-    point of one solid in the other then), and where one solid may be inside the other.
+    None where triangles are missing, where there are few faces in all, and where one solid may be inside the other.
     """
     if a is None or b is None or len(a.numbers) * len(b.numbers) <= _FEW:
-        return None
-    gap = tree_distance(a.surface.bvh, b.surface.bvh, T)
-    if gap <= 0.0:
         return None
     corners_b, corners_a = to_target(T, b.surface.vertices), to_target(inverse(T), a.surface.vertices)
     if not (a.surface.is_any_outside(corners_b) and b.surface.is_any_outside(corners_a)):
         return None
+    return faces_nearby(a, b, T)
+
+
+def faces_nearby(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces]:
+    """The faces of two solids that are no further from the other one than nearest points or an overlap can be."""
     off = a.surface.error + b.surface.error
     # The solids are no further apart than their triangles and this, nor a face nearer than its triangles less this.
-    limit = gap + 2.0 * off
-    return a.near(b.surface, T, limit), b.near(a.surface, inverse(T), limit)
+    limit = max(tree_distance(a.surface.bvh, b.surface.bvh, T), 0.0) + 2.0 * off
+    return a.near(b, T, limit), b.near(a, inverse(T), limit)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.engine.farthest import End, Pieces, Sheet, farthest
+from clamp3d.engine.farthest import End, Pieces, farthest
 from clamp3d.engine.surface import Surface
 from clamp3d.geometry.manifolds import arrays_of, as_manifold
 from clamp3d.geometry.pose import Array, to_source
@@ -112,7 +112,7 @@ def thickness(a: Surface, b: Surface, T: Array, shared: Common, end: End, cuts: 
     (on_a, off_a), (on_b, off_b) = _origins(a, in_a), _origins(b, in_b)
     # Those that lie on a surface alone are no way from it.
     sides = (a, in_a, on_b | ~on_a, off_b), (b, in_b, on_a | ~on_b, off_a)
-    every = [Pieces.of(Sheet(s, s.mutual_errors), pieces[rows], errors[rows]) for s, pieces, rows, errors in sides]
+    every = [Pieces.of(s, pieces[rows], errors[rows]) for s, pieces, rows, errors in sides]
     return np.inf if end(np.inf, max(pieces.reached for pieces in every)) else farthest(every, end, cuts)
 
 

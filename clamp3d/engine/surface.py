@@ -192,11 +192,15 @@ class Surface:
 
     def _is_in_middle(self, face: NDArray[np.int64], points: Array) -> NDArray[np.bool_]:
         """Which of points (k, 3) on triangles ``face`` (k,) are well within these, and on no other triangle's edge."""
+        return np.asarray(~self._on_sides(face, points).any(axis=1))
+
+    def _on_sides(self, face: NDArray[np.int64], points: Array) -> NDArray[np.bool_]:
+        """Which sides (k, 3) of triangles ``face`` (k,) points (k, 3) on these may lie on, rounded."""
         corners = self.vertices[self.faces[face]]
         sides = np.roll(corners, -1, axis=1) - corners
         inward = np.cross(self.normals[face][:, None], sides)
         margin = np.einsum("kij,kij->ki", points[:, None] - corners, inward)
-        return np.asarray((margin > _MIDDLE * (sides**2).sum(axis=2)).all(axis=1))
+        return np.asarray(margin <= _MIDDLE * (sides**2).sum(axis=2))
 
     @cached_property
     def has_sides(self) -> bool:
@@ -287,18 +291,42 @@ class Surface:
             return np.zeros(len(points))
         away, face, foot = self.nearest(points)
         # On an edge the nearest triangle is either of two; of a flat one the true border can be that of its neighbour.
-        error = self._edge_error[face]
+        error = self._corner_error[face]
         if self.has_own_errors:
-            error = np.where(self._is_in_middle(face, foot), self.face_error[face], error)
+            on_sides = self._on_sides(face, foot)
+            count = on_sides.sum(axis=1)
+            of_sides = np.where(on_sides, self._side_error[face], self.face_error[face, None]).max(axis=1)
+            error = np.where(count <= 1, of_sides, error)
         return np.where(away <= 1e-9 * self.scale, error, self.error)
 
+    def errors_within(self, triangles: Array, distances: Array) -> Array:
+        """The largest mutual error (k,) mm of a triangle that is no further than ``distances`` (k,) from (k, 3, 3)."""
+        middles = triangles.mean(axis=1)
+        reach = distances + np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1, initial=0.0)
+        errors, rows = np.zeros(len(triangles)), np.arange(len(triangles))
+        *others, finest = sorted(self.fine_groups, key=lambda group: -group.error)
+        for group in others:
+            near = group.distance(middles[rows]) <= reach[rows]
+            errors[rows[near]] = group.error
+            rows = rows[~near]
+        errors[rows] = finest.error
+        return errors
+
     @cached_property
-    def _edge_error(self) -> Array:
+    def _corner_error(self) -> Array:
         """The largest error (m,) of a triangle and all that share a corner with it."""
-        assert self.face_error is not None
         corner = np.zeros(len(self.vertices))
-        np.maximum.at(corner, self.faces.reshape(-1), np.repeat(self.face_error, 3))
+        np.maximum.at(corner, self.faces.reshape(-1), np.repeat(self.face_errors, 3))
         return np.asarray(corner[self.faces].max(axis=1))
+
+    @cached_property
+    def _side_error(self) -> Array:
+        """The larger error (m, 3) of both triangles at each side of one; at others than two that of its corners."""
+        error = np.repeat(self._corner_error[:, None], 3, axis=1)
+        _, pairs, across = edges_of(self.faces, 2)
+        side = ((self.faces[pairs] == across[:, :, None]).argmax(axis=2) + 1) % 3
+        error[pairs, side] = self.face_errors[pairs].max(axis=1)[:, None]
+        return error
 
 
 @dataclass(eq=False)
@@ -315,6 +343,14 @@ class Group:
         if len(self.rows) == len(self.surface.faces):
             return self.surface.bvh
         return fcl_tree(self.surface.vertices, self.surface.faces[self.rows])
+
+    @cached_property
+    def _own_surface(self) -> Surface:
+        return Surface(self.surface.vertices, self.surface.faces[self.rows])
+
+    def distance(self, points: Array) -> Array:
+        """Distance (k,) of points (k, 3) from them."""
+        return self._own_surface.distance(points)
 
 
 _ROUNDED, _EXACT = 1e-16, 1e-7

@@ -139,9 +139,10 @@ def bounds_at(brep: bytes, T: Array) -> Array:
     return bounds_of(moved(from_bytes(brep), T))
 
 
-def face_bounds_at(brep: bytes, T: Array) -> Array:
-    """Boxes (n, 2, 3) along the target's axes of the faces of a solid placed by ``T`` (4, 4), mm."""
-    return np.array([bounds_of(face) for face in explore(moved(from_bytes(brep), T), "FACE")])
+def face_bounds_at(brep: bytes, T: Array, numbers: IntArray) -> Array:
+    """Boxes (k, 2, 3) along the target's axes of the faces numbered (k,) of a solid placed by ``T`` (4, 4), mm."""
+    faces = [*explore(moved(from_bytes(brep), T), "FACE")]
+    return np.array([bounds_of(faces[k]) for k in numbers.tolist()]).reshape(-1, 2, 3)
 
 
 def moved(shape: Any, T: Array) -> Any:

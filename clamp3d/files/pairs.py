@@ -208,13 +208,15 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     meshes = _meshed(shape, sag)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[Border], ...] = ([], [])
-    for face, mesh in zip(explore(shape, "FACE"), meshes, strict=True):
-        uv, source, off = _samples(face, *mesh, sag)
+    for face, (_, coarse, at) in zip(explore(shape, "FACE"), meshes, strict=True):
+        # Its border may have corners that lie beside its surface, by so much that no piece of them is ever near it.
+        corners = points_on(face, at)
+        uv, source, off = _samples(face, corners[coarse], at[coarse], sag)
         if not len(uv):
             continue
         points, rows = distinct_points_on(face, uv.reshape(-1, 2))
         triangles = rows.reshape(-1, 3)
-        errors = np.maximum(off, border_sag(face, *mesh[:2])[source])
+        errors = np.maximum(off, border_sag(face, corners, coarse)[source])
         border = Border(points, triangles, errors)
         _, areas = normals_and_areas(points[triangles])
         # Beside its border a face may be as near to the other solid's as to its own.
@@ -264,16 +266,17 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     return operation.Shape()
 
 
-def _samples(face: Any, points: Array, triangles: IntArray, uv: Array, sag: float) -> tuple[Array, IntArray, Array]:
+def _samples(face: Any, ends: Array, corners: Array, sag: float) -> tuple[Array, IntArray, Array]:
     """Triangles (k, 3, 2) of a face in its surface's parameters, which of its mesh (k,) each is of, and how far off.
 
-    They are cut in two at the middle of an edge until no edge's middle is farther than ``sag`` mm from the surface, or
-    there are too many.
+    Those of its mesh have their ``ends`` (m, 3, 3) on the surface, at the parameters ``corners`` (m, 3, 2). They are
+    cut in two at the middle of an edge until no edge's middle is farther than ``sag`` mm from the surface, or there are
+    too many.
     """
     kind, frame, size = form_of(occ.BRepAdaptor_Surface(face))
-    corners, ends, source = uv[triangles], points[triangles], np.arange(len(triangles))
+    count = len(corners)
+    source = np.arange(count)
     finished = [(corners[:0], source[:0], np.empty(0))]
-    count = len(triangles)
     while len(corners):
         middles = edge_middles(corners)
         true = points_on(face, middles.reshape(-1, 2)).reshape(-1, 3, 3)

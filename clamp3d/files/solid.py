@@ -76,14 +76,19 @@ class BrepSolid(MeshShape):
             self._tessellations[chord] = make(self.brep, chord)
         return self._tessellations[chord]
 
+    def tessellated_near(self, faces: tuple[int, ...], chord: float) -> Tessellation:
+        """Triangles within about ``chord`` mm of the faces with these numbers, and coarse ones of all others."""
+        return cad_process.tessellate_finely(self.brep, chord, faces)
+
     def tops(self, direction: Array) -> Array:
         """How high (n,) mm each face reaches along a unit vector (3,); infinite for splines, which is not certain."""
         key = tuple(direction.round(12).tolist())
         if key not in self._tops:
             frame, across = np.eye(4), np.linalg.svd(direction[None])[2][1]
             frame[:3, :3] = np.cross(across, direction), across, direction
-            tops = cad_process.face_bounds_at(self.brep, frame)[:, 1, 2]
-            self._tops[key] = np.where(self.surfaces.kind == OTHER, np.inf, tops)
+            self._tops[key] = np.full(len(self.surfaces.kind), np.inf)
+            exact = np.flatnonzero(self.surfaces.kind != OTHER)
+            self._tops[key][exact] = cad_process.face_bounds_at(self.brep, frame, exact)[:, 1, 2]
         return self._tops[key]
 
     @cached_property

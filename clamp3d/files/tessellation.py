@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -11,11 +11,13 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
-from clamp3d.files.open_cascade import explore, matrix, occ, parse, require_open_cascade
-from clamp3d.geometry.mesh import IntArray, appended
+from clamp3d.files.open_cascade import explore, faces_of, matrix, occ, parse, require_open_cascade
+from clamp3d.geometry.mesh import IntArray, appended, is_closed
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
 
+COARSE = 0.1
+"""Chord error (mm) of faces that nobody needs finely: of all where meshes are asked first, of those far from others."""
 ANGLE = 0.35
 """Largest turn (rad) from facet to facet, so that a small fillet gets facets enough to be seen as round."""
 
@@ -68,23 +70,17 @@ class Tessellation:
     errors: Array
 
 
-def tessellate(brep: bytes, chord: float) -> Tessellation:
+def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -> Tessellation:
     """Triangles of a solid within about ``chord`` mm of its faces; what they keep is measured afterwards.
 
+    ``near``: numbers of the faces that are meshed so; all others are within `COARSE`, if the triangles close then.
     Raises Clamp3dError if a face gets no triangles.
     """
     # A copy: of a solid with triangles Open CASCADE measures distances by their boxes, and leaves out what of a round
     # flat face is beyond them.
     solid, form = parse(brep), surfaces(brep)
     faces = [*explore(solid, "FACE")]
-    for finer in _FINER:
-        occ.BRepTools.Clean_s(solid)
-        occ.BRepMesh_IncrementalMesh(solid, 0.7 * chord / finer, False, ANGLE, False)
-        meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
-        overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
-        worst = max((off.max(initial=0.0) for off in overlooked), default=0.0)
-        if worst <= chord or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
-            break
+    meshes, overlooked = _meshes(solid, faces, form, chord, near)
     corners, triples, numbers, errors = [], [], [], []
     for k, (face, (points, triangles, uv)) in enumerate(zip(faces, meshes, strict=True)):
         if not len(triangles):
@@ -101,7 +97,60 @@ def tessellate(brep: bytes, chord: float) -> Tessellation:
     _, first, index = np.unique(points.round(_DIGITS), axis=0, return_index=True, return_inverse=True)
     vertices, F = points[first], index.reshape(-1)[triangles]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    if near is not None and not is_closed(F[whole]):  # faces that are one, in two places, get other points each
+        return tessellate(brep, chord)
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
+
+
+def _meshes(
+    solid: Any, faces: list[Any], form: Surfaces, chord: float, near: tuple[int, ...] | None
+) -> tuple[list[tuple[Array, IntArray, Array]], list[Array]]:
+    """The triangles of each face, as `triangles_of` gives them, and how far (m,) mm a spline is from them elsewhere."""
+    chords = np.full(len(faces), chord)
+    steps: list[tuple[Any, Collection[int]]] = [(solid, range(len(faces)))]
+    if near is not None:
+        # Open CASCADE keeps triangles that are there, and takes their edges' points for the faces beside them.
+        others = sorted({*range(len(faces))} - {*near})
+        chords[others] = COARSE
+        steps = [(faces_of(solid, np.array(near, dtype=np.int64)), near), (solid, others)]
+    for finer in _FINER:
+        occ.BRepTools.Clean_s(solid)
+        for shape, numbers in steps:
+            if numbers:
+                _mesh(shape, {k: faces[k] for k in numbers}, form, float(chords[[*numbers]].max()) / finer)
+        meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
+        overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
+        is_seen = all(off.max(initial=0.0) <= most for off, most in zip(overlooked, chords.tolist(), strict=True))
+        if is_seen or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
+            break
+    return meshes, overlooked
+
+
+def _mesh(shape: Any, faces: dict[int, Any], form: Surfaces, chord: float) -> None:
+    """Have a shape's ``faces``, by their numbers, meshed within about ``chord`` mm; others keep what they have.
+
+    Open CASCADE looks whether triangles of splines are near enough, and puts points where they are not: in a cylinder
+    with a long border a hundred times as many as it needs. So for planes, cylinders and cones it does so only where
+    triangles without these points are too far off.
+    """
+    how = occ.IMeshTools_Parameters()
+    how.Deflection, how.Angle = 0.7 * chord, ANGLE
+    straight = [k for k, face in faces.items() if form.kind[k] <= CONE and _is_spline(face)]
+    how.ControlSurfaceDeflection = not straight
+    occ.BRepMesh_IncrementalMesh(shape, how)
+    if not straight:
+        return
+    near = {k for k in straight if _deviation(faces[k], form, k, *triangles_of(faces[k], k)).max(initial=0.0) <= chord}
+    for k, face in faces.items():
+        if k not in near and (form.kind[k] == OTHER or _is_spline(face)):
+            occ.BRepTools.Clean_s(face)
+    how.ControlSurfaceDeflection = True
+    occ.BRepMesh_IncrementalMesh(shape, how)  # of the faces without triangles
+
+
+def _is_spline(face: Any) -> bool:
+    """Whether the file gives the face as a B-spline, which may be a plain surface."""
+    return bool(occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface)
 
 
 def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:

@@ -11,8 +11,8 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
 from clamp3d import check
+from clamp3d.engine import cad_pair, moving_pair
 from clamp3d.engine import depth as depth_module
-from clamp3d.engine import moving_pair
 from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.cad_pair import CadPair
@@ -20,6 +20,7 @@ from clamp3d.engine.depth import penetration
 from clamp3d.engine.exact import SHARES, _measured, attested_overlap, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.farthest import Pieces, farthest
 from clamp3d.engine.judge import judge, kind_of_overlap
+from clamp3d.engine.mesh_distance import surfaces_meet
 from clamp3d.engine.model import CAD_CHORDS, Counters, model_of
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.refine import refine
@@ -147,6 +148,26 @@ def test_the_faces_that_are_near_tell_the_distance_of_the_solids(angle):
     assert len(near[0]) < 0.7 * len(a.face_meshes.numbers)
     distance = exact_distance(a, b, np.eye(4))
     assert distance.lower - 1e-9 <= 0.3 <= distance.upper + 1e-9
+
+
+def test_the_faces_that_are_near_tell_the_distance_where_triangles_meet(monkeypatch):
+    monkeypatch.setattr(near_faces_module, "_FEW", 0)
+    ring = cut(rod(40.0, 0.0, 20.0), rod(30.02, -1.0, 21.0))
+    a, b = models_of(drum(), moved(ring, turn((0, 0, 1), 0.03)))
+    assert surfaces_meet(*(model.face_meshes.surface for model in (a, b)), np.eye(4))
+    near = near_faces(a.face_meshes, b.face_meshes, np.eye(4))
+    assert len(near[0]) < 0.7 * len(a.face_meshes.numbers)
+    distance = exact_distance(a, b, np.eye(4))
+    assert distance.lower - 1e-9 <= 0.02 <= distance.upper + 1e-9
+
+
+def test_solids_that_a_point_shows_to_touch_are_asked_for_no_distance(monkeypatch):
+    """The drum stands in a ring that has its radius."""
+    ring = cut(rod(40.0, -5.0, 25.0), rod(30.0, -6.0, 26.0))
+    a, b = models_of(drum(), ring)
+    monkeypatch.setattr(cad_pair, "exact_distance", lambda *_: pytest.fail("is asked"))
+    answers = [*CadPair(a, b, np.eye(4), lambda _: False)._nearest()]
+    assert [answer.upper <= 1e-6 for _, answer in answers] == [True]
 
 
 def test_a_wire_between_a_solid_and_its_triangles_is_inside_it(monkeypatch):
@@ -323,6 +344,20 @@ def test_a_face_of_a_common_part_without_triangles_leaves_the_others_as_they_are
     assert len(faces) == 6
     lost = sum(len(border.triangles) for border in whole.borders) - sum(len(border.triangles) for border in borders)
     assert 0 < lost == len(sample(*faces[0])[0])
+
+
+def test_a_corner_beside_its_faces_does_not_cut_their_triangles_for_ever():
+    """Parts that were fitted together have corners that lie 0.1 mm beside their faces, within a tolerance."""
+    low, high = block((0, 0, 0), (10, 10, 10)), block((5, 5, 5), (15, 15, 15))
+    for vertex in explore(low, "VERTEX"):
+        if min(occ.BRep_Tool.Pnt_s(vertex).Coord()) > 9.0:
+            occ.BRep_Builder().UpdateVertex(vertex, occ.gp_Pnt(10.1, 10.1, 10.1), 0.2)
+    part = pairs.common(to_bytes(low), to_bytes(high), np.eye(4), 0.04)
+    assert part.volume == pytest.approx(125.0)
+    for border in part.borders:
+        assert len(border.triangles) < 10_000
+        assert border.points.max() <= 10.0 + 1e-9
+        assert border.errors.max() <= 1e-9
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3])

@@ -13,8 +13,15 @@ from hypothesis import strategies as st
 from clamp3d import Scene, Verdict, check, distance, shapes
 from clamp3d.engine.batch import bounds_at_poses
 from clamp3d.engine.facets import rods_distance
-from clamp3d.engine.farthest import Pieces, Sheet, farthest
-from clamp3d.engine.mesh_distance import are_apart, errors_nearby, meshes_distance, nearest_points, surface_distance
+from clamp3d.engine.farthest import Pieces, farthest
+from clamp3d.engine.mesh_distance import (
+    are_apart,
+    errors_nearby,
+    meshes_distance,
+    nearest_points,
+    surface_distance,
+    surfaces_meet,
+)
 from clamp3d.engine.model import ModelCache
 from clamp3d.engine.near_faces import FaceMeshes, near_faces
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
@@ -67,7 +74,12 @@ def test_the_faces_that_can_be_the_nearest_are_those_whose_triangles_are():
             assert (low[k], high[k]) == (pytest.approx(corners.min(axis=0)), pytest.approx(corners.max(axis=0)))
             apart = nearest_points(Surface(one.surface.vertices, rows), other.surface, pose)[1]
             assert (number in chosen) == (apart <= gap + 2.0 * 0.03)
-    assert near_faces(a, b, translation(9.0, 0.0, 0.0)) is None  # they meet
+    T = translation(9.0, 0.0, 0.0)  # they meet
+    for one, other, pose, chosen in zip((a, b), (b, a), (T, inverse(T)), near_faces(a, b, T), strict=True):
+        every = {k: Surface(one.surface.vertices, one.surface.faces[one.face == k]) for k in one.numbers.tolist()}
+        meeting = {k for k, part in every.items() if surfaces_meet(part, other.surface, pose)}
+        assert meeting <= set(chosen.tolist()) < set(every)
+        assert meeting
     assert near_faces(a, FaceMeshes(a.surface, 0 * a.face), T) is None  # there are few
     assert near_faces(a, None, T) is None
 
@@ -117,7 +129,8 @@ def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound(c
     for _ in range(8):
         triangles = rng.uniform((0.0, 0.0, 0.0), (5.0, 30.0, 20.0), (4, 3, 3))
         off = rng.choice([0.0, 0.01], (2, len(bracket.faces)))
-        pieces = Pieces.of(Sheet(bracket, off[0]), triangles, off[1, :4])
+        bracket = Surface(bracket.vertices, bracket.faces, off[0], has_own_errors=True)
+        pieces = Pieces.of(bracket, triangles, off[1, :4])
         every = [pieces]
         gained += int((pieces.moved(np.arange(4)).at_most < 0.99 * pieces.at_most).sum())
 
@@ -147,13 +160,33 @@ def test_what_is_cut_is_all_there_and_no_point_of_it_is_further_than_its_bound(c
 
 
 @pytest.mark.parametrize(("missing", "depth"), [([], 2.0), ([4], 1.02 * 2.0)])
-def test_a_piece_is_no_further_than_it_is_moved_and_what_is_off(missing, depth):
-    """It spans two triangles of a wall, 2 mm below it; any triangle may be the one that is crossed on the way out."""
-    bracket = Surface(BRACKET.vertices, np.delete(BRACKET.faces, missing, axis=0))
-    sheet = Sheet(bracket, np.eye(len(bracket.faces))[-1] * 0.02)
-    piece = Pieces.of(sheet, np.array([[[2.0, 3.0, 3.0], [2.0, 27.0, 4.0], [2.0, 15.0, 17.0]]]), np.array([0.01]))
+@pytest.mark.parametrize(("crossed", "more"), [(16, 0.02), (17, 0.02), (10, 0.0)])
+def test_a_piece_is_no_further_than_it_is_moved_and_what_is_off_there(missing, depth, crossed, more):
+    """It spans two triangles of a wall, 2 mm below it: each may be crossed on the way out, others count for nothing."""
+    errors = np.delete(np.eye(len(BRACKET.faces))[crossed] * 0.02, missing)
+    bracket = Surface(BRACKET.vertices, np.delete(BRACKET.faces, missing, axis=0), errors, has_own_errors=True)
+    piece = Pieces.of(bracket, np.array([[[2.0, 3.0, 3.0], [2.0, 27.0, 4.0], [2.0, 15.0, 17.0]]]), np.array([0.01]))
     assert piece.at_most[0] > 6.0
-    assert piece.moved(np.arange(1)).at_most[0] == pytest.approx(depth + 0.01 + 0.02, abs=1e-5)
+    assert piece.moved(np.arange(1)).at_most[0] == pytest.approx(depth + 0.01 + more, abs=1e-5)
+
+
+def test_errors_within_a_distance_are_those_of_all_triangles_that_are_no_further():
+    """Against the distance of each triangle by itself; groups of errors differ by at most half."""
+    rng, ball = np.random.default_rng(8), trimesh.creation.icosphere(2, 10.0)
+    counted = 0
+    for _ in range(12):
+        errors = rng.choice([0.0, 1.0], len(ball.faces)) * 10.0 ** rng.uniform(-2.0, 0.0, len(ball.faces))
+        one = Surface(ball.vertices, ball.faces, errors, has_own_errors=True)
+        triangles = rng.normal(size=(5, 1, 3)) * 7.0 + rng.normal(size=(5, 3, 3))
+        reach = rng.uniform(0.0, 4.0, 5)
+        each = [fcl_tree(one.vertices, row[None]) for row in one.faces]
+        for triangle, most, within in zip(triangles, reach, one.errors_within(triangles, reach), strict=True):
+            tree = fcl_tree(triangle, np.array([[0, 1, 2]]))
+            near = np.array([fcl.distance(*fcl_pair(tree, other, np.eye(4))) for other in each]) <= most
+            assert within >= errors[near].max(initial=0.0)
+            counted += within <= 1.5 * errors[near].max(initial=0.0) + 0.02
+        assert one.errors_within(triangles, np.full(5, 99.0)) == pytest.approx(errors.max())
+    assert counted > 10  # of 60: the reach is taken from the middle of each
 
 
 def test_no_more_triangles_are_added_than_there_are_cuts(monkeypatch):
@@ -168,7 +201,7 @@ def test_no_more_triangles_are_added_than_there_are_cuts(monkeypatch):
 
     monkeypatch.setattr(Pieces, "cut", counted)
     triangle = np.array([[[-5.0, -5.0, 6.0], [6.0, -4.0, 6.0], [0.0, 6.0, 6.5]]])
-    pieces = Pieces.of(Sheet(ball, np.zeros(len(ball.faces))), triangle, np.zeros(1))
+    pieces = Pieces.of(ball, triangle, np.zeros(1))
     bounds = []
     for cuts in (60, 600):
         sizes[:] = [1]
@@ -363,7 +396,7 @@ def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_else
         one.has_own_errors = True
         assert one.error_at(middles) == pytest.approx(one.face_error)
         on_edges = ball.vertices[ball.face_adjacency_edges].mean(axis=1)
-        assert (one.error_at(on_edges) >= one.face_error[ball.face_adjacency].max(axis=1)).all()
+        assert one.error_at(on_edges) == pytest.approx(one.face_error[ball.face_adjacency].max(axis=1))
         assert one.error_at(1.01 * middles) == pytest.approx(one.face_error.max())
 
 

@@ -95,30 +95,49 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
         assert attested == deep
         return Distance(-1.0 if found or not quick else -math.inf, method=f"{share} {quick}")
 
-    def meshes(a, b, T, chord, enough, *, thorough=False, cuts=None):
-        return Distance(method=f"{chord} {['thorough'] * thorough}")
-
     slab, sections = (lambda *_, by=by: Distance(method=by) for by in ("slab", "sections"))
-    cad_levels(deep, meshes_distance=meshes, slab_distance=slab, coaxial_distance=sections, exact_overlap=overlap)
+    cad_levels(
+        deep,
+        slab_distance=slab,
+        coaxial_distance=sections,
+        exact_overlap=overlap,
+        meshes_distance=lambda a, b, T, chord, *_: Distance(method=f"{chord}"),
+        surface_distance=lambda a, b, T, enough, cuts: Distance(0.0, 2.0, [a, cuts], [b]),
+        faces_nearby=lambda a, b, T: ([a], [b]),
+    )
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    begin, both = ["sections", "probe", *["distance"] * (deep <= 0.0)], (0.1, 0.0018)
+    begin = ["sections", "probe", *["distance"] * (deep < 0.0)]
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
-    for first, second, triangles, end in (
-        (both, (0.1,), math.inf, ["0.0018 ['thorough']"]),
-        (both, both, 7_500, []),
-        (both, both, 7_501, []),
-        ((), (), math.inf, ["0.0018 ['thorough']"]),
+    for chords, triangles, fine in (
+        ([(0.1, 0.0018), (0.1,)], 15_000, "near [1] 20000 near [2]"),
+        ([(0.1, 0.0018), (0.1, 0.0018)], 15_001, "near [1] 20000 near [2]"),
+        ([(0.1,), (0.1,)], 80_001, "near [1] 100000 near [2]"),
+        ([(), (0.1,)], 15_000, "whole 0.0018 100000 whole 0.0018"),
     ):
         a, b = (
-            SimpleNamespace(exact=1, is_simple=True, chords=chords, quick_bodies=(1,), fine_triangles=triangles)
-            for chords in (first, second)
+            SimpleNamespace(
+                exact=1,
+                is_simple=True,
+                chords=some,
+                face_meshes=k,
+                quick_bodies=(1,),
+                fine_triangles_near=lambda faces, triangles=triangles, k=k: triangles if faces == [k] else math.inf,
+                outer_near=lambda faces: f"near {faces}",
+                outer=lambda chord, *, thorough: f"whole {chord if thorough else None}",
+            )
+            for k, some in enumerate(chords, 1)
         )
-        coarse, fine = ["0.1 []", "slab"] * bool(first), ["0.0018 []"] * (first == second == both)
-        place = 2 if triangles != 7_500 else 0 if deep <= 1e-4 else 1
-        soon, later, last = (fine * (k == place) for k in range(3))
-        order = [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
-        assert order == [*coarse, *begin, *soon, *shares, "forms", *later, *again, *last, *end]
+        coarse = ["0.1", "slab"] * all(chords)
+        place = 3 if not all(chords) or triangles > 80_000 else 1 if triangles <= 15_000 and deep <= 1e-4 else 2
+        soon, later, last = ([fine] * (k == place) for k in (1, 2, 3))
+        answers = [answer for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
+        order = [
+            answer.method if answer.point_a is None else " ".join(map(str, [*answer.point_a, *answer.point_b]))
+            for answer in answers
+        ]
+        assert order == [*coarse, *begin, *soon, *shares, "forms", *later, *again, *last]
+        assert {x.method for x in answers if x.point_a} == {"meshes (FCL), chord error 0.0018 mm"}
         a.quick_bodies = None
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
 
@@ -127,12 +146,9 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
     def fails(*_, **__):
         raise SolverError("no answer in 20 s")
 
-    cad_levels(meshes_distance=fails, exact_overlap=lambda a, b, T, share, **_: Distance(method=f"{share}"))
+    cad_levels(exact_overlap=lambda a, b, T, share, **_: Distance(method=f"{share}"))
 
-    class Unmeshed(SimpleNamespace):
-        fine_triangles = property(fails)
-
-    a = Unmeshed(exact=1, is_simple=True, chords=(), quick_bodies=None)
+    a = SimpleNamespace(exact=1, is_simple=True, chords=(), quick_bodies=None, outer=fails)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:3]] == ["probe", "0.04", "0.04"]
     assert len(answers) == 4

@@ -111,7 +111,7 @@ def test_extents_of_splines_are_not_believed(monkeypatch):
     pair = placed_pair("spline_under_plate", np.random.default_rng(3), -0.02, splines=0.0)
     a, b = model(pair.a), model(pair.b)
     bounds = cad_process.face_bounds_at
-    monkeypatch.setattr(cad_process, "face_bounds_at", lambda brep, T: bounds(brep, T) - 0.05)
+    monkeypatch.setattr(cad_process, "face_bounds_at", lambda *given: bounds(*given) - 0.05)
     spline = next(x for x in (a, b) if x.is_free_form)
     tops = spline.exact.tops(np.array([0.0, 0.0, 1.0]))
     assert np.isinf(tops[spline.exact.surfaces.kind == OTHER]).all()

@@ -178,6 +178,46 @@ def test_no_triangle_is_further_from_its_face_nor_the_face_from_it_than_its_erro
         points = np.vstack([rng.dirichlet(np.ones(3), 9) @ corners, corners.mean(axis=0), middles])
         assert off_face(every[made.face[row]], points).max() <= made.errors[row] + 1e-7
     assert made.errors.max() < 0.15
+    assert is_closed(made.faces)
+
+
+@pytest.mark.parametrize("splines", [False, True])
+@pytest.mark.parametrize("name", TRIANGULATED)
+def test_triangles_are_fine_on_some_faces_coarse_on_others_and_close(name, splines):
+    brep = to_bytes(first_solid(as_splines(TRIANGULATED[name]) if splines else TRIANGULATED[name]))
+    coarse, fine = tessellate(brep, tessellation.COARSE), tessellate(brep, 0.008)
+    shares, count = np.vstack([np.random.default_rng(5).dirichlet(np.ones(3), 5), np.eye(3)]), coarse.face.max() + 1
+    sizes = []
+    for k in range(count):
+        made = tessellate(brep, 0.008, (k,))
+        assert is_closed(made.faces)
+        of_face = [(mesh.face == k).sum() for mesh in (coarse, made, fine)]
+        assert of_face[1] >= max(of_face[0], 0.9 * of_face[2])
+        sizes.append(len(made.faces))
+        assert made.errors[made.face == k].max() <= 1.01 * fine.errors[fine.face == k].max() + 1e-9
+        for other in range(count):
+            rows, its = made.face == other, fine.faces[fine.face == other]
+            assert (
+                beyond(fine.vertices[its].reshape(-1, 3), made, rows) <= 1.01
+            )  # where the nearest of them is not its own
+            square, *_ = point_mesh_squared_distance(
+                (shares @ made.vertices[made.faces[rows]]).reshape(-1, 3), fine.vertices, its
+            )
+            assert (np.sqrt(square).reshape(rows.sum(), -1).max(axis=1) <= made.errors[rows] + 0.008).all()
+    assert count < 5 or min(sizes) < 0.7 * len(fine.faces)
+
+
+@pytest.mark.parametrize(
+    ("shape", "most"),
+    [(cone(5, 4, 0, 50), 1_000), (cut(cone(5, 4, 0, 50), ball(3)), 40_000)],
+    ids=["whole", "with a hollow"],
+)
+def test_a_cone_that_is_a_spline_gets_no_more_triangles_than_it_needs(shape, most):
+    """Where Open CASCADE looks whether they are near enough, it gets 190 000."""
+    made = tessellate(to_bytes(first_solid(as_splines(shape))), 0.0018)
+    assert is_closed(made.faces)
+    assert made.errors.max() <= 0.0018
+    assert len(made.faces) < most
 
 
 def bumpy(count, at, height):
