@@ -174,8 +174,8 @@ def test_errors_within_a_distance_are_those_of_all_triangles_that_are_no_further
     """Against the distance of each triangle by itself; groups of errors differ by at most half."""
     rng, ball = np.random.default_rng(8), trimesh.creation.icosphere(2, 10.0)
     counted = 0
-    for _ in range(12):
-        errors = rng.choice([0.0, 1.0], len(ball.faces)) * 10.0 ** rng.uniform(-2.0, 0.0, len(ball.faces))
+    for k in range(12):
+        errors = rng.choice([k % 2, 1.0], len(ball.faces)) * 10.0 ** rng.uniform(-2.0, 0.0, len(ball.faces))
         one = Surface(ball.vertices, ball.faces, errors, has_own_errors=True)
         triangles = rng.normal(size=(5, 1, 3)) * 7.0 + rng.normal(size=(5, 3, 3))
         reach = rng.uniform(0.0, 4.0, 5)
@@ -397,6 +397,8 @@ def test_the_error_of_a_triangle_counts_where_it_is_and_a_quarter_of_it_not_else
         assert one.error_at(middles) == pytest.approx(one.face_error)
         on_edges = ball.vertices[ball.face_adjacency_edges].mean(axis=1)
         assert one.error_at(on_edges) == pytest.approx(one.face_error[ball.face_adjacency].max(axis=1))
+        every = [one.face_error[(ball.faces == corner).any(axis=1)].max() for corner in range(len(ball.vertices))]
+        assert (one.error_at(ball.vertices) >= every).all()
         assert one.error_at(1.01 * middles) == pytest.approx(one.face_error.max())
 
 
