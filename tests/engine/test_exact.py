@@ -150,6 +150,20 @@ def test_the_faces_that_are_near_tell_the_distance_of_the_solids(angle):
     assert distance.lower - 1e-9 <= 0.3 <= distance.upper + 1e-9
 
 
+@pytest.mark.parametrize("limit", [0.1, 4.0])
+def test_the_faces_that_are_near_another_solid_are_those_whose_triangles_are(limit):
+    """A rod with a groove beside a drum, wherever both are."""
+    drummed, grooved = models_of(drum(), cut(rod(4.0, -30.0, 30.0), ring(4.0, 1.0)))
+    T = random_pose(np.random.default_rng(2))
+    a, b = drummed.face_meshes, grooved.face_meshes
+    at_b = T @ shift(34.05, 0.0, 8.0) @ turn((0, 1, 0), 0.2)
+    for one, other, pose in ((a, b, np.linalg.inv(T) @ at_b), (b, a, np.linalg.inv(at_b) @ T)):
+        expected = [k for k in one.numbers if tree_distance(one.tree(k), other.surface.bvh, pose) <= limit]
+        assert one.near(other, pose, limit).tolist() == expected
+        assert len(expected) < len(one.numbers)
+    assert len(a.near(b, np.linalg.inv(T) @ at_b, 4.0)) > 1
+
+
 def test_the_faces_that_are_near_tell_the_distance_where_triangles_meet(monkeypatch):
     monkeypatch.setattr(near_faces_module, "_FEW", 0)
     ring = cut(rod(40.0, 0.0, 20.0), rod(30.02, -1.0, 21.0))
