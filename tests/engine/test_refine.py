@@ -87,7 +87,7 @@ def cad_levels(monkeypatch):
 
 
 @pytest.mark.parametrize("found", [True, False])
-@pytest.mark.parametrize("deep", [5.0, 2e-4, 1e-4, 0.0, -math.inf])
+@pytest.mark.parametrize("deep", [5.0, 2e-4, 1e-4, 0.0, -1e-5, -math.inf])
 def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatch, found, deep):
     """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more."""
 
