@@ -54,11 +54,11 @@ class CadPair:
         if sections is not None:
             yield "sections", sections
         yield from self._nearest()
-        if self._attested <= _COINCIDENT:
-            yield from self._fine_meshes(QUICK_TRIANGLES)
+        if self._attested <= _COINCIDENT and self._is_small:
+            yield from self._fine_meshes()
         yield from self._common_part(quick=True)
         yield from closed_forms
-        yield from self._fine_meshes(MOST_FINE)
+        yield from self._fine_meshes()
         yield from self._common_part(quick=False)
         if not self._has_asked_fine_meshes:  # Open CASCADE did not find the common part
             yield "meshes", self._fine_meshes_distance(CUTS)
@@ -102,9 +102,14 @@ class CadPair:
         near_a, near_b = self._nearby
         return self.a.fine_triangles_near(near_a), self.b.fine_triangles_near(near_b)
 
-    def _fine_meshes(self, most: float) -> Levels:
-        """What fine meshes say, once, if they have no more than ``most`` triangles each."""
-        if not self._has_asked_fine_meshes and self._has_meshes and max(self._fine_triangles) <= most:
+    @property
+    def _is_small(self) -> bool:
+        """Whether fine meshes of both solids, which other pairs share, take less time than Open CASCADE."""
+        return self._has_meshes and self.a.fine_triangles + self.b.fine_triangles <= QUICK_TRIANGLES
+
+    def _fine_meshes(self) -> Levels:
+        """What fine meshes say, once, if they are not too large."""
+        if not self._has_asked_fine_meshes and self._has_meshes and max(self._fine_triangles) <= MOST_FINE:
             self._has_asked_fine_meshes = True
             yield "meshes", self._fine_meshes_distance(FEW_CUTS)
 

@@ -110,10 +110,11 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for chords, triangles, fine in (
-        ([(0.1, 0.0018), (0.1,)], 15_000, "near [1] 20000 near [2]"),
-        ([(0.1, 0.0018), (0.1, 0.0018)], 15_001, "near [1] 20000 near [2]"),
+        ([(0.1, 0.0018), (0.1,)], 7_500, "near [1] 20000 near [2]"),
+        ([(0.1, 0.0018), (0.1, 0.0018)], 7_501, "near [1] 20000 near [2]"),
+        ([(0.1,), (0.1,)], 80_000, "near [1] 20000 near [2]"),
         ([(0.1,), (0.1,)], 80_001, "near [1] 100000 near [2]"),
-        ([(), (0.1,)], 15_000, "whole 0.0018 100000 whole 0.0018"),
+        ([(), (0.1,)], 7_500, "whole 0.0018 100000 whole 0.0018"),
     ):
         a, b = (
             SimpleNamespace(
@@ -122,6 +123,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
                 chords=some,
                 face_meshes=k,
                 quick_bodies=(1,),
+                fine_triangles=triangles,
                 fine_triangles_near=lambda faces, triangles=triangles, k=k: triangles if faces == [k] else math.inf,
                 outer_near=lambda faces: f"near {faces}",
                 outer=lambda chord, *, thorough: f"whole {chord if thorough else None}",
@@ -129,7 +131,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
             for k, some in enumerate(chords, 1)
         )
         coarse = ["0.1", "slab"] * all(chords)
-        place = 3 if not all(chords) or triangles > 80_000 else 1 if triangles <= 15_000 and deep <= 1e-4 else 2
+        place = 3 if not all(chords) or triangles > 80_000 else 1 if triangles <= 7_500 and deep <= 1e-4 else 2
         soon, later, last = ([fine] * (k == place) for k in (1, 2, 3))
         answers = [answer for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
         order = [
