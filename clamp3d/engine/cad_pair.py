@@ -40,13 +40,15 @@ class CadPair:
         self.a, self.b, self.T, self.enough = a, b, T, enough
         self._has_meshes = bool(a.chords and b.chords)
         self._has_asked_fine_meshes = False
+        self._coarse = Distance()
         self._has_common_part = False
         self._attested = 0.0
 
     def levels(self, closed_forms: Levels) -> Levels:
         """All levels; ``closed_forms`` come after those that take less time."""
         if self._has_meshes:
-            yield "meshes", meshes_distance(self.a, self.b, self.T, CAD_CHORDS[0], self.enough, FEW_CUTS)
+            self._coarse = meshes_distance(self.a, self.b, self.T, CAD_CHORDS[0], self.enough, FEW_CUTS)
+            yield "meshes", self._coarse
             slab = slab_distance(self.a, self.b, self.T, self.enough)
             if slab is not None:
                 yield "boxes", slab
@@ -80,12 +82,10 @@ class CadPair:
             return
         # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
         yield "exact", unproven
-        if max(self._fine_triangles) <= MOST_FINE:
-            self._has_asked_fine_meshes = True
+        meshes = self._coarse
+        if self._may_mesh_finely:
             meshes = self._fine_meshes_distance(FEW_CUTS)
-        else:
-            meshes = meshes_distance(self.a, self.b, self.T, CAD_CHORDS[0], self.enough, FEW_CUTS)
-        yield "meshes", meshes
+            yield "meshes", meshes
         if distance.lower <= meshes.upper:
             yield "exact", distance
 
@@ -97,10 +97,10 @@ class CadPair:
         return faces_nearby(self.a.face_meshes, self.b.face_meshes, self.T)
 
     @cached_property
-    def _fine_triangles(self) -> tuple[float, float]:
-        """About how many triangles meshes of both solids have that are fine there."""
+    def _may_mesh_finely(self) -> bool:
+        """Whether meshes of both solids that are fine there are not too large."""
         near_a, near_b = self._nearby
-        return self.a.fine_triangles_near(near_a), self.b.fine_triangles_near(near_b)
+        return max(self.a.fine_triangles_near(near_a), self.b.fine_triangles_near(near_b)) <= MOST_FINE
 
     @property
     def _is_small(self) -> bool:
@@ -109,8 +109,7 @@ class CadPair:
 
     def _fine_meshes(self) -> Levels:
         """What fine meshes say, once, if they are not too large."""
-        if not self._has_asked_fine_meshes and self._has_meshes and max(self._fine_triangles) <= MOST_FINE:
-            self._has_asked_fine_meshes = True
+        if not self._has_asked_fine_meshes and self._has_meshes and self._may_mesh_finely:
             yield "meshes", self._fine_meshes_distance(FEW_CUTS)
 
     def _common_part(self, *, quick: bool) -> Levels:
@@ -139,6 +138,7 @@ class CadPair:
 
     def _fine_meshes_distance(self, cuts: int) -> Distance:
         """What meshes say that are fine where the solids are near each other; nothing where they take too long."""
+        self._has_asked_fine_meshes = True
         try:
             if self._has_meshes:
                 near_a, near_b = self._nearby

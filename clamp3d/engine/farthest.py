@@ -34,8 +34,8 @@ class Pieces(NamedTuple):
     """Triangles (m, 3, 3), each off by ``errors`` (m,) mm, and how far (mm) they are from a surface.
 
     ``middles`` (m,): their middles, from triangle ``nearest`` (m,); ``off`` (m,): the errors of both;
-    ``at_most`` (m,): any point of what they stand for, from what the surface is; ``is_moved`` (m,): whether that
-    is the least of both bounds, not of the first alone, which is quicker.
+    ``at_most`` (m,): any point of what they stand for, from what the surface stands for; ``is_moved`` (m,): whether
+    that is the least of both bounds, not of the first alone, which is quicker.
     """
 
     surface: Surface

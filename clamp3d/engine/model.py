@@ -186,9 +186,13 @@ class Model:
             except Clamp3dError as error:
                 self._failures[chord, inside] = error
                 raise
-            self.counters.built["meshes"] += mesh is not None
-            self.counters.built["triangles"] += 0 if mesh is None else len(mesh.faces)
+            if mesh is not None:
+                self._count(mesh)
         return self._meshes[chord, inside]
+
+    def _count(self, mesh: Surface) -> None:
+        self.counters.built["meshes"] += 1
+        self.counters.built["triangles"] += len(mesh.faces)
 
     def depth(self, points: Array) -> Array:
         """How deep (k,) mm points (k, 3) lie inside, never too much; negative outside."""
@@ -312,10 +316,7 @@ class CadModel(Model):
         """Mesh that is fine on some of its faces, numbered (k,), and coarse elsewhere; Clamp3dError if it has gaps."""
         if self._is_small:
             return self.outer(CAD_CHORDS[-1], thorough=True)
-        mesh = _fine_mesh(self.shape, tuple(faces.tolist()))
-        self.counters.built["meshes"] += 1
-        self.counters.built["triangles"] += len(mesh.faces)
-        return mesh
+        return _fine_mesh(self, tuple(faces.tolist()))
 
     @cached_property
     def _is_small(self) -> bool:
@@ -357,20 +358,20 @@ class CadModel(Model):
         return cad_process.depths(self.shape.brep, points)
 
     def _surface(self, chord: float, inside: bool) -> Surface:
-        return _closed(self.shape, self.shape.tessellated(chord))
+        return self._closed(self.shape.tessellated(chord))
 
-
-def _closed(shape: BrepSolid, mesh: Tessellation) -> Surface:
-    """The triangles of a solid. Raises Clamp3dError if they do not close, as coarse ones do, or no finer are asked."""
-    if not is_closed(mesh.faces):
-        raise Clamp3dError(f"the triangles of {shape.name} do not close")
-    return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
+    def _closed(self, mesh: Tessellation) -> Surface:
+        if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
+            raise Clamp3dError(f"the triangles of {self.name} do not close")
+        return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
 
 
 @lru_cache(maxsize=_KEPT)
-def _fine_mesh(shape: BrepSolid, faces: tuple[int, ...]) -> Surface:
-    """The triangles of a solid that are fine on some of its faces."""
-    return _closed(shape, shape.tessellated_near(faces, CAD_CHORDS[-1]))
+def _fine_mesh(model: CadModel, faces: tuple[int, ...]) -> Surface:
+    """The triangles of a solid that are fine on some of its faces; kept, but not all of those of a large assembly."""
+    mesh = model._closed(model.shape.tessellated_near(faces, CAD_CHORDS[-1]))
+    model._count(mesh)
+    return mesh
 
 
 class MeshModel(Model):

@@ -304,8 +304,8 @@ class Surface:
         middles = triangles.mean(axis=1)
         reach = distances + np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1, initial=0.0)
         errors, rows = np.zeros(len(triangles)), np.arange(len(triangles))
-        *others, finest = sorted(self.fine_groups, key=lambda group: -group.error)
-        for group in others:
+        finest, *others = self.fine_groups
+        for group in reversed(others):
             near = group.distance(middles[rows]) <= reach[rows]
             errors[rows[near]] = group.error
             rows = rows[~near]

@@ -86,9 +86,9 @@ class BrepSolid(MeshShape):
         if key not in self._tops:
             frame, across = np.eye(4), np.linalg.svd(direction[None])[2][1]
             frame[:3, :3] = np.cross(across, direction), across, direction
-            self._tops[key] = np.full(len(self.surfaces.kind), np.inf)
-            exact = np.flatnonzero(self.surfaces.kind != OTHER)
-            self._tops[key][exact] = cad_process.face_bounds_at(self.brep, frame, exact)[:, 1, 2]
+            tops, exact = np.full(len(self.surfaces.kind), np.inf), np.flatnonzero(self.surfaces.kind != OTHER)
+            tops[exact] = cad_process.face_bounds_at(self.brep, frame, exact)[:, 1, 2]
+            self._tops[key] = tops
         return self._tops[key]
 
     @cached_property

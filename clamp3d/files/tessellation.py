@@ -106,21 +106,19 @@ def _meshes(
     solid: Any, faces: list[Any], form: Surfaces, chord: float, near: tuple[int, ...] | None
 ) -> tuple[list[tuple[Array, IntArray, Array]], list[Array]]:
     """The triangles of each face, as `triangles_of` gives them, and how far (m,) mm a spline is from them elsewhere."""
-    chords = np.full(len(faces), chord)
-    steps: list[tuple[Any, Collection[int]]] = [(solid, range(len(faces)))]
+    steps: list[tuple[Any, Collection[int], float]] = [(solid, range(len(faces)), chord)]
     if near is not None:
         # Open CASCADE keeps triangles that are there, and takes their edges' points for the faces beside them.
         others = sorted({*range(len(faces))} - {*near})
-        chords[others] = COARSE
-        steps = [(faces_of(solid, np.array(near, dtype=np.int64)), near), (solid, others)]
+        steps = [(faces_of(solid, np.array(near, dtype=np.int64)), near, chord), (solid, others, COARSE)]
     for finer in _FINER:
         occ.BRepTools.Clean_s(solid)
-        for shape, numbers in steps:
+        for shape, numbers, most in steps:
             if numbers:
-                _mesh(shape, {k: faces[k] for k in numbers}, form, float(chords[[*numbers]].max()) / finer)
+                _mesh(shape, {k: faces[k] for k in numbers}, form, most / finer)
         meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
         overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
-        is_seen = all(off.max(initial=0.0) <= most for off, most in zip(overlooked, chords.tolist(), strict=True))
+        is_seen = all(overlooked[k].max(initial=0.0) <= most for _, numbers, most in steps for k in numbers)
         if is_seen or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
             break
     return meshes, overlooked

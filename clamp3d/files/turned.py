@@ -92,7 +92,7 @@ def turned_about(form: Surfaces, axis: Array) -> NDArray[np.bool_]:
 def turned_sections(brep: bytes, pose: bytes, radius: float) -> tuple[Section, ...]:
     """The section of a solid about z of a pose (4, 4), in bytes, as far as it is turned about that, with each chord.
 
-    None where it is not so far as ``radius`` (mm), and where Open CASCADE's sections are not what they should be.
+    Nothing where it is not so far as ``radius`` (mm), and where Open CASCADE's sections are not what they should be.
     """
     axis = np.frombuffer(pose).reshape(4, 4)
     solid = moved(from_bytes(brep), inverse(axis))
@@ -105,16 +105,14 @@ def turned_sections(brep: bytes, pose: bytes, radius: float) -> tuple[Section, .
     wide = min(reach, math.hypot(*np.maximum(high, -low)[:2]) + _BEYOND)
     circles = _circles(form, is_turned, axis)
     cut, other = (_cut(solid, angle, wide, low[2] - _BEYOND, high[2] + _BEYOND) for angle in _ANGLES)
-    chord = CHORDS[-1]
-    loops, others = (_loops(x, angle, circles, chord) for x, angle in zip((cut, other), _ANGLES, strict=True))
-    area, lost = (
-        area_of(cut, adaptive=True),
-        chord * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops),
-    )
+    drawn = [_loops(cut, _ANGLES[0], circles, chord) for chord in CHORDS]
+    loops, others = drawn[-1], _loops(other, _ANGLES[1], circles, CHORDS[-1])
+    area = area_of(cut, adaptive=True)
+    lost = CHORDS[-1] * sum(float(np.linalg.norm(_ways(loop), axis=1).sum()) for loop in loops)
     is_whole = area > 0.0 and abs(_area(loops) - area) <= lost + _APPROXIMATE * area
     if not (is_whole and abs(_area(loops) - _area(others)) <= lost):
         return ()
-    return tuple(Section(_loops(cut, _ANGLES[0], circles, e), e + TOLERANCE, reach, e) for e in CHORDS)
+    return tuple(Section(x, chord + TOLERANCE, reach, chord) for x, chord in zip(drawn, CHORDS, strict=True))
 
 
 def _reach(solid: Any, is_turned: NDArray[np.bool_], radius: float) -> float:

@@ -197,12 +197,10 @@ def test_triangles_are_fine_on_some_faces_coarse_on_others_and_close(name, splin
         assert made.errors[made.face == k].max() <= 1.01 * fine.errors[fine.face == k].max() + 1e-9
         for other in range(count):
             rows, its = made.face == other, fine.faces[fine.face == other]
-            assert (
-                beyond(fine.vertices[its].reshape(-1, 3), made, rows) <= 1.01
-            )  # where the nearest of them is not its own
-            square, *_ = point_mesh_squared_distance(
-                (shares @ made.vertices[made.faces[rows]]).reshape(-1, 3), fine.vertices, its
-            )
+            # The nearest triangle need not be the one that stands for a point: so it may be a little more.
+            assert beyond(fine.vertices[its].reshape(-1, 3), made, rows) <= 1.01
+            points = (shares @ made.vertices[made.faces[rows]]).reshape(-1, 3)
+            square, *_ = point_mesh_squared_distance(points, fine.vertices, its)
             assert (np.sqrt(square).reshape(rows.sum(), -1).max(axis=1) <= made.errors[rows] + 0.008).all()
     assert count < 5 or min(sizes) < 0.7 * len(fine.faces)
 
