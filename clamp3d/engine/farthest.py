@@ -26,6 +26,9 @@ _BENT = 1.02
 _HAIR = 1e-9
 """Relative to the size: a piece that reaches over a border by less is not cut there."""
 
+_CUT_FROM = 0.25
+"""Where between what is sharp and the largest bound pieces are cut: all at once are too many, a few take many steps."""
+
 End = Callable[[float, float], bool]
 """Whether a bound (mm) is sharp enough, or none can be, since each is at least the second number (mm)."""
 
@@ -63,8 +66,10 @@ class Pieces(NamedTuple):
         feet = closest_points(surface.vertices[surface.faces[nearest]], pieces.mean(axis=1))
         moves = _moves_beyond(surface, pieces, feet, surface.normals[nearest])
         length = np.linalg.norm(moves, axis=1)
-        bound = length + self.errors[rows] + surface.errors_within(pieces, length)
+        bound = length + self.errors[rows]
         kept = np.flatnonzero(bound < self.at_most[rows])
+        bound[kept] += surface.errors_within(pieces[kept], length[kept])
+        kept = kept[bound[kept] < self.at_most[rows[kept]]]
         if surface.has_sides:
             kept = kept[surface.is_outside(pieces[kept] + moves[kept, None])]
         else:
@@ -118,7 +123,7 @@ def _farthest(pieces: Pieces, floor: float, end: End, cuts: int) -> float:
     while True:
         bound = float(pieces.at_most.max(initial=0.0))
         sharp = max(floor, float((_SHARP * pieces.middles + pieces.off).max(initial=0.0)))
-        largest = (pieces.at_most > sharp) & (pieces.at_most >= 0.5 * (sharp + bound))
+        largest = pieces.at_most > sharp + _CUT_FROM * (bound - sharp)
         if not largest.any() or end(bound, pieces.reached):
             return bound
         if (fresh := largest & ~pieces.is_moved).any():

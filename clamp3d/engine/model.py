@@ -220,9 +220,12 @@ class Model:
     @cached_property
     def quick_bodies(self) -> Forms | None:
         """The closed form where it is quicker to ask than the mesh; else None."""
+        is_large = bool(self.chords) and len(self.outer(self.chords[0]).faces) > _LARGE
+        if is_large and self.is_free_form:  # what is no bar is asked of the mesh then
+            return None
         if self.bodies is None or all(form.surface is None for form in self.bodies):
             return self.bodies
-        return self.bodies if len(self.outer(self.chords[0]).faces) <= _LARGE else None
+        return None if is_large else self.bodies
 
     def _hull_of_convex(self, mesh: Surface) -> Forms | None:
         """A mesh that is its own hull, but for rounding; None if it is not, or so large that the mesh is quicker."""

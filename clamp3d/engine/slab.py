@@ -73,6 +73,12 @@ def _height_of(model: Model, direction: Array, rows: IntArray) -> float:
     """How high (mm) what ``rows`` (k,) of a solid's coarse triangles stand for reaches along a unit vector (3,)."""
     assert model.exact is not None
     assert model.face_meshes is not None
-    mesh = model.face_meshes.surface
-    corners = (mesh.vertices @ direction)[mesh.faces[rows]].max(axis=1) + mesh.face_errors[rows]
-    return float(np.minimum(corners, model.exact.tops(direction)[model.face_meshes.face[rows]]).max())
+    mesh, face = model.face_meshes.surface, model.face_meshes.face[rows]
+    corners = (mesh.vertices @ direction)[mesh.faces[rows]].max(axis=1)
+    reached, at_most = float(corners.max()), corners + mesh.face_errors[rows]
+    higher = at_most > reached
+    if not higher.any():
+        return reached
+    faces, row = np.unique(face[higher], return_inverse=True)
+    tops = model.exact.tops(direction, faces)[row.reshape(-1)]
+    return max(reached, float(np.minimum(at_most[higher], tops).max()))

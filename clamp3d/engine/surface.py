@@ -382,26 +382,29 @@ def _without_slender(corners: Array) -> Array:
 
     Those that are next to nothing stay: their neighbours are as near.
     """
-    most = len(corners) + _MOST_PIECES
-    while True:
+    whole, left = [corners[:0]], _MOST_PIECES
+    while len(corners):
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
         length = sides.max(axis=1)
         width = 2.0 * normals_and_areas(corners)[1] / np.maximum(length, 1e-300)
-        rows = np.flatnonzero((_ROUNDED * length**3 > _EXACT * width**2) & (width > _EXACT))
-        if not 0 < len(rows) <= most - len(corners):
-            return corners
-        edge = sides[rows].argmax(axis=1)
-        pieces = halves(corners[rows], edge, edge_middles(corners[rows])[np.arange(len(rows)), edge])
-        corners = np.concatenate([np.delete(corners, rows, axis=0), pieces])
+        slender = (_ROUNDED * length**3 > _EXACT * width**2) & (width > _EXACT)
+        left -= int(slender.sum())
+        if left < 0:
+            slender[:] = False
+        whole.append(corners[~slender])
+        corners, edge = corners[slender], sides[slender].argmax(axis=1)
+        corners = halves(corners, edge, edge_middles(corners)[np.arange(len(edge)), edge])
+    return np.concatenate(whole)
 
 
 def fcl_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
     """FCL's tree of oriented boxes of triangles (m, 3)."""
     import fcl
 
+    used, rows = np.unique(faces, return_inverse=True)  # it copies all the vertices that it gets
     tree = fcl.BVHModel()
-    tree.beginModel(len(vertices), len(faces))
-    tree.addSubModel(vertices, faces)
+    tree.beginModel(len(used), len(faces))
+    tree.addSubModel(vertices[used], rows.reshape(faces.shape))
     tree.endModel()
     return tree
 

@@ -17,6 +17,8 @@ from clamp3d.geometry.pose import Array
 
 TOLERANCE = 1e-6
 """Accuracy (mm) taken for an answer by Open CASCADE, ten times its own confusion of points (1e-7)."""
+_WIDENED = 2e-7
+"""Open CASCADE's larger box (mm) of a flat face is larger by its confusion of points; rounded up."""
 _ADAPTIVE = 1e-6
 """Relative accuracy (1) that an adaptive integration is asked for."""
 
@@ -108,6 +110,19 @@ def bounds_of(shape: Any, *, quick: bool = False) -> Array:
     return np.array([box.CornerMin().Coord(), box.CornerMax().Coord()])
 
 
+def bounds_of_solid(solid: Any) -> Array:
+    """The same of a solid, from faces that may reach further than its corners: close boxes of splines take long."""
+    corners = np.array([occ.BRep_Tool.Pnt_s(corner).Coord() for corner in explore(solid, "VERTEX")])
+    if not len(corners):
+        return bounds_of(solid)
+    bounds, outward = np.array([corners.min(axis=0), corners.max(axis=0)]), np.array([[-1.0], [1.0]])
+    faces = [(bounds_of(face, quick=True), face) for face in explore(solid, "FACE")]
+    for wide, face in sorted(faces, key=lambda pair: -(outward * (pair[0] - bounds)).max()):
+        if (outward * (wide - bounds) > _WIDENED).any():
+            bounds = outward * np.maximum(outward * bounds, outward * bounds_of(face))
+    return bounds
+
+
 def volume_of(shape: Any) -> float:
     """Volume of a TopoDS_Shape, mm^3; negative if it is wound inward."""
     return _integral(shape, "VolumeProperties_s")
@@ -136,7 +151,7 @@ def _integral(shape: Any, function: str, *accuracy: float) -> float:
 
 def bounds_at(brep: bytes, T: Array) -> Array:
     """Box (2, 3) along the target's axes of a solid placed by ``T`` (4, 4), mm."""
-    return bounds_of(moved(from_bytes(brep), T))
+    return bounds_of_solid(moved(from_bytes(brep), T))
 
 
 def face_bounds_at(brep: bytes, T: Array, numbers: IntArray) -> Array:

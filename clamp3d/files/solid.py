@@ -9,7 +9,7 @@ import numpy as np
 
 from clamp3d.files import cad_process
 from clamp3d.files.faces import OTHER, Surfaces
-from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
+from clamp3d.files.open_cascade import bounds_of_solid, from_bytes, require_open_cascade, to_bytes
 from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
 from clamp3d.geometry.pose import Array
@@ -57,7 +57,7 @@ class BrepSolid(MeshShape):
     @classmethod
     def of(cls, solid: Any, name: str) -> BrepSolid:
         """From a TopoDS_Shape, in this process."""
-        return cls(name, to_bytes(solid), bounds_of(solid))
+        return cls(name, to_bytes(solid), bounds_of_solid(solid))
 
     @cached_property
     def solid(self) -> Any:
@@ -80,14 +80,15 @@ class BrepSolid(MeshShape):
         """Triangles within about ``chord`` mm of the faces with these numbers, and coarse ones of all others."""
         return cad_process.tessellate_finely(self.brep, chord, faces)
 
-    def tops(self, direction: Array) -> Array:
-        """How high (n,) mm each face reaches along a unit vector (3,); infinite for splines, which is not certain."""
-        key = tuple(direction.round(12).tolist())
+    def tops(self, direction: Array, faces: IntArray) -> Array:
+        """How high (k,) mm faces numbered (k,) reach along a unit vector (3,); infinite for splines: not certain."""
+        key = (*direction.round(12).tolist(), *faces.tolist())
         if key not in self._tops:
             frame, across = np.eye(4), np.linalg.svd(direction[None])[2][1]
             frame[:3, :3] = np.cross(across, direction), across, direction
-            tops, exact = np.full(len(self.surfaces.kind), np.inf), np.flatnonzero(self.surfaces.kind != OTHER)
-            tops[exact] = cad_process.face_bounds_at(self.brep, frame, exact)[:, 1, 2]
+            tops, exact = np.full(len(faces), np.inf), self.surfaces.kind[faces] != OTHER
+            if exact.any():
+                tops[exact] = cad_process.face_bounds_at(self.brep, frame, faces[exact])[:, 1, 2]
             self._tops[key] = tops
         return self._tops[key]
 

@@ -265,45 +265,58 @@ def _array_of_numbers() -> Any:
 
 def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
-    sag_of: dict[int, float] = {}
-    for edge, nodes, at in _border(face):
-        if occ.BRep_Tool.Degenerated_s(edge):
-            continue
-        curve = occ.BRepAdaptor_Curve(edge)
-        if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line:
+    ends, places, counts, factors = [], [], [], []
+    for edge, polygon in _border(face):
+        if (curve := _curve(edge)) is None:
             continue
         is_circle = curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle
         factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
+        nodes, at = _nodes(polygon), np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
         times = at[:-1, None] + np.diff(at)[:, None] * shares
-        true = np.array([curve.Value(t).Coord() for t in times.reshape(-1).tolist()]).reshape(*times.shape, 3)
-        ends = points[nodes][:, None]
-        sags = factor * distances_from_segments(true, ends[:-1], ends[1:]).max(axis=1)
-        sag_of.update(zip(_edge_keys(nodes[:-1], nodes[1:]).tolist(), sags.tolist(), strict=True))
+        ends.append(np.column_stack([nodes[:-1], nodes[1:]]))
+        places += [curve.Value(t).Coord() for t in times.reshape(-1).tolist()]
+        counts.append(np.full(len(times), len(shares)))
+        factors.append(np.full(len(times), factor))
+    if not ends:
+        return np.zeros(len(triangles))
+    segments = np.concatenate(ends)
+    row = np.repeat(np.arange(len(segments)), np.concatenate(counts))
+    off = distances_from_segments(np.array(places), *points[segments[row]].transpose(1, 0, 2))
+    border, of_border = np.unique(_edge_keys(*segments.T), return_inverse=True)
+    sag = np.zeros(len(border))
+    np.maximum.at(sag, of_border.reshape(-1)[row], np.concatenate(factors)[row] * off)
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
-    errors, on_border = np.zeros(keys.shape), np.isin(keys, np.array([*sag_of], dtype=np.int64))
-    errors[on_border] = [sag_of[key] for key in keys[on_border].tolist()]
-    return np.asarray(errors.max(axis=1))
+    nearest = np.minimum(np.searchsorted(border, keys), len(border) - 1)
+    return np.asarray(np.where(border[nearest] == keys, sag[nearest], 0.0).max(axis=1))
 
 
 def covers(face: Any, triangles: IntArray) -> bool:
     """Whether the triangles (m, 3) of a meshed face end at its border alone: Open CASCADE can leave some out."""
-    border = [_edge_keys(nodes[:-1], nodes[1:]) for _, nodes, _ in _border(face)]
+    border = [_edge_keys(nodes[:-1], nodes[1:]) for nodes in (_nodes(polygon) for _, polygon in _border(face))]
     keys, count = np.unique(_edge_keys(triangles, np.roll(triangles, -1, axis=1)), return_counts=True)
     return bool(np.isin(keys[count == 1], np.concatenate(border)).all())
 
 
-def _border(face: Any) -> Iterator[tuple[Any, IntArray, Array]]:
-    """The edges of a meshed face, each with its nodes (k,) in the triangulation, and their parameters (k,)."""
+def _border(face: Any) -> Iterator[tuple[Any, Any]]:
+    """The edges of a meshed face, each with its polygon (Poly_PolygonOnTriangulation) in the triangulation."""
     triangulation = occ.BRep_Tool.Triangulation_s(face, place := occ.TopLoc_Location())
     for edge in explore(face, "EDGE"):
         polygon = occ.BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, place)
         if polygon is not None:
-            count = range(1, polygon.NbNodes() + 1)
-            yield (
-                edge,
-                np.array([polygon.Node(i) - 1 for i in count]),
-                np.array([polygon.Parameter(i) for i in count]),
-            )
+            yield edge, polygon
+
+
+def _nodes(polygon: Any) -> IntArray:
+    """The numbers (k,) of a polygon's points, from 0."""
+    return np.array([polygon.Node(i) - 1 for i in range(1, polygon.NbNodes() + 1)])
+
+
+def _curve(edge: Any) -> Any:
+    """The curve of an edge that triangles may be off; None of straight edges, and of those that are a point."""
+    if occ.BRep_Tool.Degenerated_s(edge):
+        return None
+    curve = occ.BRepAdaptor_Curve(edge)
+    return None if curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Line else curve
 
 
 def _edge_keys(a: IntArray, b: IntArray) -> IntArray:
