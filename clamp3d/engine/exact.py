@@ -126,8 +126,8 @@ def exact_overlap(
         return _UNKNOWN
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
-    if not all(len(border.triangles) for border in shared.borders):
-        return _UNKNOWN
+    if not (shared.borders and all(len(border.triangles) for border in shared.borders)):
+        return _by_corners(a, b, T, shared.corners)
     on_a, on_b = shared.borders
     # Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     sides = [_measured(on_a, on_b), _measured(on_b, on_a)]
@@ -148,6 +148,13 @@ def exact_overlap(
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=_UNKNOWN.method)
     return bounded(at_most)
+
+
+def _by_corners(a: Model, b: Model, T: Array, corners: Array) -> Distance:
+    """What corners (k, 3) of a common part attest, of which Open CASCADE makes no triangles."""
+    if not len(corners):
+        return _UNKNOWN
+    return replace(attested_overlap(corners, depths_in(a, b, T, corners)), method=_UNKNOWN.method)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:

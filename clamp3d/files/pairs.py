@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -65,7 +65,8 @@ class CommonPart:
     """What two solids share: ``volume`` (mm^3), ``area`` (mm^2) and ``box`` (2, 3); nothing if the volume is 0.
 
     ``borders``, if any, are on the first and on the second solid; without them ``volumes`` is the volume by two
-    integrations, the smaller first.
+    integrations, the smaller first. Open CASCADE does not always find triangles for borders: then ``corners`` (k, 3) of
+    the common part are all there is.
     """
 
     volume: float
@@ -73,6 +74,7 @@ class CommonPart:
     box: Array
     borders: tuple[Border, ...] = ()
     volumes: tuple[float, float] = (0.0, 0.0)
+    corners: Array = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class Nearest(NamedTuple):
@@ -205,18 +207,22 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         return CommonPart(volume, area, box, volumes=volumes_of(shape))
     size = float(np.linalg.norm(box[1] - box[0]))
     sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
-    meshes = _meshed(shape, sag)
+    corners = np.array([occ.BRep_Tool.Pnt_s(corner).Coord() for corner in explore(shape, "VERTEX")]).reshape(-1, 3)
+    try:
+        meshes = _meshed(shape, sag)
+    except Clamp3dError:
+        return CommonPart(volume, area, box, corners=corners)
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[Border], ...] = ([], [])
     for face, (_, coarse, at) in zip(explore(shape, "FACE"), meshes, strict=True):
         # Its border may have corners that lie beside its surface, by so much that no piece of them is ever near it.
-        corners = points_on(face, at)
-        uv, source, off = _samples(face, corners[coarse], at[coarse], sag)
+        ends = points_on(face, at)
+        uv, source, off = _samples(face, ends[coarse], at[coarse], sag)
         if not len(uv):
             continue
         points, rows = distinct_points_on(face, uv.reshape(-1, 2))
         triangles = rows.reshape(-1, 3)
-        errors = np.maximum(off, border_sag(face, corners, coarse)[source])
+        errors = np.maximum(off, border_sag(face, ends, coarse)[source])
         border = Border(points, triangles, errors)
         _, areas = normals_and_areas(points[triangles])
         # Beside its border a face may be as near to the other solid's as to its own.
@@ -225,7 +231,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append(border)
-    return CommonPart(volume, area, box, tuple(map(_joined, sides)))
+    return CommonPart(volume, area, box, tuple(map(_joined, sides)), corners=corners)
 
 
 def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:

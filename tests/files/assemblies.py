@@ -162,9 +162,22 @@ def write_step(parts, path):
 
 
 def deepest(common, solid):
-    """The largest distance that a corner of the common part's mesh has from the solid's boundary."""
+    """The largest distance that a corner of the common part's mesh has from the solid's boundary.
+
+    All corners of a solid in its own place lie on that: then points half way between two of them count that are inside.
+    """
     from_boundary, points = from_shell(solid), mesh_corners(common)
-    return max((from_boundary(p) for p in points[:: max(1, len(points) // 60)]), default=0.0)
+    points = points[:: max(1, len(points) // 60)]
+    depth = max((from_boundary(p) for p in points), default=0.0)
+    if depth > 1e-6:
+        return depth
+    place, inside = occ.BRepClass3d_SolidClassifier(solid), []
+    for a, b in itertools.combinations(points[::4], 2):
+        middle = occ.gp_Pnt(*(0.5 * (np.array(a.Coord()) + b.Coord())))
+        place.Perform(middle, 1e-7)
+        if place.State() == occ.TopAbs_State.TopAbs_IN:
+            inside.append(middle)
+    return max(map(from_boundary, inside), default=depth)
 
 
 def deepest_corner(a, b):
