@@ -7,6 +7,7 @@ certain), 4 failed inside (a fault of the program, or a solver that could not pr
 from __future__ import annotations
 
 import errno
+import gc
 import importlib
 import os
 import sys
@@ -89,6 +90,7 @@ def main() -> None:
     prepare_streams()
     end_on_signals()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads only cost time to start
+    gc.set_threshold(100_000)  # what libraries load is no garbage: to look for some among it is a sixth of a short run
     try:
         _check_environment()
         with warnings.catch_warnings():
