@@ -20,6 +20,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.files.pairs import Border, CommonPart
+from clamp3d.files.tessellation import COARSE
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 End = Callable[[Distance, Distance], bool]
@@ -30,6 +31,8 @@ _UNKNOWN = Distance(method=f"{METHOD}, without a common part")
 """What is said where Open CASCADE gives no common part."""
 _PROBED, _MANY = 8, 16
 """Points whose depth is measured exactly: as many of those that look deepest, and of all others."""
+_SPREAD = 64
+"""Corners of triangles that do not close whose depth is measured, wherever they are: each takes about a millisecond."""
 SHARES = (0.04, 0.015, 0.004)
 """Chords of the border of a common part, of its thickness: the first is quick, the last takes up to seconds."""
 _CUTS = 200_000
@@ -59,12 +62,14 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     """How deep some points of the common part of meshes lie in two solids that touch or overlap.
 
     The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
+    Of triangles that do not close some corners are tried.
     ``chord``: chord error (mm) of the meshes, that of the coarsest by default. ``points_each``: points that look
     deepest in one solid, and in both.
     """
     nothing = Distance(method=METHOD)
     if not (a.chords and b.chords):
-        return nothing
+        points = _corners_in_both_boxes(a, b, T, min(COARSE, chord))
+        return attested_overlap(points, depths_in(a, b, T, points)) if len(points) else nothing
     meshes = [model.outer(min(model.chords[0], chord), thorough=True) for model in (a, b)]
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
@@ -74,6 +79,23 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     orders = [np.argsort(-look, kind="stable")[:points_each] for look in (np.minimum(*looks), np.maximum(*looks))]
     points = points[np.concatenate(orders)]
     return attested_overlap(points, depths_in(a, b, T, points))
+
+
+def _corners_in_both_boxes(a: Model, b: Model, T: Array, chord: float) -> Array:
+    """Some corners (k, 3) of triangles of two solids, which need not close, that lie in the box of the other one."""
+    assert a.exact is not None
+    assert b.exact is not None
+    try:
+        on_a, on_b = (solid.tessellated(chord).vertices for solid in (a.exact, b.exact))
+    except Clamp3dError:  # a face gets none
+        return np.empty((0, 3))
+    corners = np.vstack([on_a, to_target(T, on_b)])
+    inside = [
+        ((x >= model.bounds[0]) & (x <= model.bounds[1])).all(axis=1)
+        for model, x in ((a, corners), (b, to_source(T, corners)))
+    ]
+    rows = np.flatnonzero(inside[0] & inside[1])
+    return corners[rows[np.linspace(0, len(rows) - 1, min(len(rows), _SPREAD)).astype(int)]]
 
 
 def depths_in(a: Model, b: Model, T: Array, points: Array) -> Array:

@@ -587,6 +587,17 @@ def test_splines_without_triangles_that_close_are_measured_by_open_cascade_alone
     assert distance.lower <= 0.05 <= distance.upper
 
 
+def test_corners_of_triangles_that_do_not_close_attest_an_overlap_without_a_common_part(monkeypatch):
+    a, b = models_of(block((-5, -5, -5), (5, 5, 5)), block((-3, -3, 4.95), (3, 3, 9)))
+    for name in ("common", "quick_common"):
+        monkeypatch.setattr(cad_process, name, lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
+    for model in (a, b):
+        model.__dict__["chords"] = ()
+    verdict, distance = judge(a, b, np.eye(4), Distance(), Thresholds(), None)
+    assert verdict.value == "clash"
+    assert distance.upper == pytest.approx(-0.05, abs=2e-6)
+
+
 @pytest.mark.parametrize("has_common_part", [True, False])
 def test_a_shallow_lens_has_its_volume_within_the_bounds_and_its_rim_in_the_box(has_common_part, monkeypatch):
     if not has_common_part:
