@@ -95,7 +95,8 @@ def _corners_in_both_boxes(a: Model, b: Model, T: Array, chord: float) -> Array:
         for model, x in ((a, corners), (b, to_source(T, corners)))
     ]
     rows = np.flatnonzero(inside[0] & inside[1])
-    return corners[rows[np.linspace(0, len(rows) - 1, min(len(rows), _SPREAD)).astype(int)]]
+    spread = np.linspace(0, len(rows) - 1, min(len(rows), _SPREAD)).astype(int)
+    return np.asarray(corners[rows[spread]])
 
 
 def depths_in(a: Model, b: Model, T: Array, points: Array) -> Array:
