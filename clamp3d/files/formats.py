@@ -32,7 +32,8 @@ class Format(NamedTuple):
     reader : str
         Module and function of ``clamp3d.files`` that reads them.
     unit : str or None
-        Unit that the format fixes ("stated": each file states it; None: neither does).
+        Unit of the format: "m" of glTF, whose Y is up; "stated" where no other may be given, since each file states it
+        or the format fixes mm; None where it is mm unless the caller says otherwise.
     library : str or None
         Optional library that the reader needs and does not ask for itself.
     """

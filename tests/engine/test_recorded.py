@@ -21,7 +21,7 @@ from tests.recorded import differences, recorded
 FILE = Path(__file__).with_name("data") / "answers.json"
 SIZE = np.array((1.0, 0.8, 1.3))
 BODIES = [
-    *DRAWN,
+    *DRAWN[:8],  # recorded: shapes that are added later would draw other pairs
     shapes.extrusion([(-9, -9), (9, -9), (9, -3), (-3, -3), (-3, 9), (-9, 9)], 14.0, name="angle"),
     shapes.sphere(6.0),
     faceted_shape(shapes.cylinder(5.0, 24.0, name="scanned rod"), 0.02, "round"),
