@@ -12,7 +12,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.farthest import Pieces, farthest
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import CAD_CHORDS, Model
 from clamp3d.engine.near_faces import near_faces
 from clamp3d.engine.overlap import common
 from clamp3d.engine.surface import Surface
@@ -20,7 +20,6 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.files.pairs import Border, CommonPart
-from clamp3d.files.tessellation import COARSE
 from clamp3d.geometry.pose import Array, to_source, to_target
 
 End = Callable[[Distance, Distance], bool]
@@ -68,8 +67,8 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_e
     """
     nothing = Distance(method=METHOD)
     if not (a.chords and b.chords):
-        points = _corners_in_both_boxes(a, b, T, min(COARSE, chord))
-        return attested_overlap(points, depths_in(a, b, T, points)) if len(points) else nothing
+        points = _corners_in_both_boxes(a, b, T, min(CAD_CHORDS[0], chord))
+        return attested_overlap(points, depths_in(a, b, T, points))
     meshes = [model.outer(min(model.chords[0], chord), thorough=True) for model in (a, b)]
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
@@ -105,7 +104,9 @@ def depths_in(a: Model, b: Model, T: Array, points: Array) -> Array:
 
 
 def attested_overlap(points: Array, depths: Array) -> Distance:
-    """The overlap that the deepest of points (k, 3) attests; where all lie beside a solid, nothing."""
+    """The overlap that the deepest of points (k, 3) attests; where there are none, or all beside a solid, nothing."""
+    if not len(points):
+        return Distance(method=METHOD)
     beside = np.minimum(depths.min(axis=0), 0.0)  # by so much it is moved into both solids, and less deep
     overlaps = np.where(beside >= -2.0 * TOLERANCE, depths.max(axis=0) + beside, -np.inf)
     k = int(np.argmax(overlaps))
@@ -150,7 +151,8 @@ def exact_overlap(
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
         return _without_common_part(a, b, T, attested)
     if not (shared.borders and all(len(border.triangles) for border in shared.borders)):
-        return _by_corners(a, b, T, shared.corners)
+        by_corners = attested_overlap(shared.corners, depths_in(a, b, T, shared.corners))
+        return replace(by_corners, method=_UNKNOWN.method)
     on_a, on_b = shared.borders
     # Lemma: what of the border lies on a solid is some of its surface, so no point is farther from all of that.
     sides = [_measured(on_a, on_b), _measured(on_b, on_a)]
@@ -171,13 +173,6 @@ def exact_overlap(
     if at_most + beside + 2.0 * TOLERANCE < max(attested, -reached.upper):  # some of it is missing
         return replace(reached, method=_UNKNOWN.method)
     return bounded(at_most)
-
-
-def _by_corners(a: Model, b: Model, T: Array, corners: Array) -> Distance:
-    """What corners (k, 3) of a common part attest, of which Open CASCADE makes no triangles."""
-    if not len(corners):
-        return _UNKNOWN
-    return replace(attested_overlap(corners, depths_in(a, b, T, corners)), method=_UNKNOWN.method)
 
 
 def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:

@@ -220,12 +220,16 @@ class Model:
     @cached_property
     def quick_bodies(self) -> Forms | None:
         """The closed form where it is quicker to ask than the mesh; else None."""
-        is_large = bool(self.chords) and len(self.outer(self.chords[0]).faces) > _LARGE
-        if is_large and self.is_free_form:  # what is no bar is asked of the mesh then
+        if self.is_free_form and self._is_large:  # it is no bar, so its closed form is not worth making
             return None
         if self.bodies is None or all(form.surface is None for form in self.bodies):
             return self.bodies
-        return None if is_large else self.bodies
+        return None if self._is_large else self.bodies
+
+    @cached_property
+    def _is_large(self) -> bool:
+        """Whether the coarsest mesh, if there is one, has too many triangles for a closed form to be quicker."""
+        return bool(self.chords) and len(self.outer(self.chords[0]).faces) > _LARGE
 
     def _hull_of_convex(self, mesh: Surface) -> Forms | None:
         """A mesh that is its own hull, but for rounding; None if it is not, or so large that the mesh is quicker."""

@@ -100,27 +100,33 @@ def faces_of(shape: Any, numbers: IntArray | None = None) -> Any:
     return kept
 
 
+def corners_of(shape: Any) -> Array:
+    """The corners (k, 3) of a TopoDS_Shape, mm."""
+    return np.array([occ.BRep_Tool.Pnt_s(corner).Coord() for corner in explore(shape, "VERTEX")]).reshape(-1, 3)
+
+
 def bounds_of(shape: Any, *, quick: bool = False) -> Array:
-    """Lower and upper corner (2, 3) of a box that holds a TopoDS_Shape, mm; a larger one if ``quick``."""
-    box = occ.Bnd_Box()
+    """Lower and upper corner (2, 3) of a box that holds the faces of a TopoDS_Shape, mm; a larger one if ``quick``.
+
+    Open CASCADE takes long for close boxes of splines: faces are asked for theirs that may reach further than others.
+    """
     if quick:
-        occ.BRepBndLib.Add_s(shape, box, False)
-    else:
-        occ.BRepBndLib.AddOptimal_s(shape, box, False, False)
-    return np.array([box.CornerMin().Coord(), box.CornerMax().Coord()])
-
-
-def bounds_of_solid(solid: Any) -> Array:
-    """The same of a solid, from faces that may reach further than its corners: close boxes of splines take long."""
-    corners = np.array([occ.BRep_Tool.Pnt_s(corner).Coord() for corner in explore(solid, "VERTEX")])
+        return _box(shape, "Add_s", False)
+    corners = corners_of(shape)
     if not len(corners):
-        return bounds_of(solid)
+        return _box(shape, "AddOptimal_s", False, False)
     bounds, outward = np.array([corners.min(axis=0), corners.max(axis=0)]), np.array([[-1.0], [1.0]])
-    faces = [(bounds_of(face, quick=True), face) for face in explore(solid, "FACE")]
+    faces = [(bounds_of(face, quick=True), face) for face in explore(shape, "FACE")]
     for wide, face in sorted(faces, key=lambda pair: -(outward * (pair[0] - bounds)).max()):
         if (outward * (wide - bounds) > _WIDENED).any():
-            bounds = outward * np.maximum(outward * bounds, outward * bounds_of(face))
+            bounds = outward * np.maximum(outward * bounds, outward * _box(face, "AddOptimal_s", False, False))
     return bounds
+
+
+def _box(shape: Any, function: str, *how: bool) -> Array:
+    box = occ.Bnd_Box()
+    getattr(occ.BRepBndLib, function)(shape, box, *how)
+    return np.array([box.CornerMin().Coord(), box.CornerMax().Coord()])
 
 
 def volume_of(shape: Any) -> float:
@@ -151,7 +157,7 @@ def _integral(shape: Any, function: str, *accuracy: float) -> float:
 
 def bounds_at(brep: bytes, T: Array) -> Array:
     """Box (2, 3) along the target's axes of a solid placed by ``T`` (4, 4), mm."""
-    return bounds_of_solid(moved(from_bytes(brep), T))
+    return bounds_of(moved(from_bytes(brep), T))
 
 
 def face_bounds_at(brep: bytes, T: Array, numbers: IntArray) -> Array:

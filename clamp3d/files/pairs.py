@@ -16,6 +16,7 @@ from clamp3d.files.open_cascade import (
     TOLERANCE,
     area_of,
     bounds_of,
+    corners_of,
     explore,
     faces_of,
     from_bytes,
@@ -207,11 +208,10 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         return CommonPart(volume, area, box, volumes=volumes_of(shape))
     size = float(np.linalg.norm(box[1] - box[0]))
     sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
-    corners = np.array([occ.BRep_Tool.Pnt_s(corner).Coord() for corner in explore(shape, "VERTEX")]).reshape(-1, 3)
     try:
         meshes = _meshed(shape, sag)
     except Clamp3dError:
-        return CommonPart(volume, area, box, corners=corners)
+        return CommonPart(volume, area, box, corners=corners_of(shape))
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
     sides: tuple[list[Border], ...] = ([], [])
     for face, (_, coarse, at) in zip(explore(shape, "FACE"), meshes, strict=True):
@@ -231,7 +231,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
         for side, distance in zip(sides, away, strict=True):
             if distance <= min(away) + TOLERANCE:  # where the two coincide the face is on both
                 side.append(border)
-    return CommonPart(volume, area, box, tuple(map(_joined, sides)), corners=corners)
+    return CommonPart(volume, area, box, tuple(map(_joined, sides)))
 
 
 def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:

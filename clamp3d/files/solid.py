@@ -9,7 +9,7 @@ import numpy as np
 
 from clamp3d.files import cad_process
 from clamp3d.files.faces import OTHER, Surfaces
-from clamp3d.files.open_cascade import bounds_of_solid, from_bytes, require_open_cascade, to_bytes
+from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
 from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
 from clamp3d.geometry.pose import Array
@@ -57,7 +57,7 @@ class BrepSolid(MeshShape):
     @classmethod
     def of(cls, solid: Any, name: str) -> BrepSolid:
         """From a TopoDS_Shape, in this process."""
-        return cls(name, to_bytes(solid), bounds_of_solid(solid))
+        return cls(name, to_bytes(solid), bounds_of(solid))
 
     @cached_property
     def solid(self) -> Any:

@@ -265,7 +265,7 @@ def _array_of_numbers() -> Any:
 
 def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     """How far (m,) mm the face's border can be from the edges of each triangle that stand for it."""
-    ends, places, counts, factors = [], [], [], []
+    ends, places, factors = [], [], []
     for edge, polygon in _border(face):
         if (curve := _curve(edge)) is None:
             continue
@@ -273,18 +273,16 @@ def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
         factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
         nodes, at = _nodes(polygon), np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
         times = at[:-1, None] + np.diff(at)[:, None] * shares
-        ends.append(np.column_stack([nodes[:-1], nodes[1:]]))
         places += [curve.Value(t).Coord() for t in times.reshape(-1).tolist()]
-        counts.append(np.full(len(times), len(shares)))
-        factors.append(np.full(len(times), factor))
+        ends.append(np.repeat(np.column_stack([nodes[:-1], nodes[1:]]), len(shares), axis=0))
+        factors.append(np.full(times.size, factor))
     if not ends:
         return np.zeros(len(triangles))
-    segments = np.concatenate(ends)
-    row = np.repeat(np.arange(len(segments)), np.concatenate(counts))
-    off = distances_from_segments(np.array(places), *points[segments[row]].transpose(1, 0, 2))
-    border, of_border = np.unique(_edge_keys(*segments.T), return_inverse=True)
+    starts, stops = np.concatenate(ends).T
+    off = np.concatenate(factors) * distances_from_segments(np.array(places), points[starts], points[stops])
+    border, row = np.unique(_edge_keys(starts, stops), return_inverse=True)
     sag = np.zeros(len(border))
-    np.maximum.at(sag, of_border.reshape(-1)[row], np.concatenate(factors)[row] * off)
+    np.maximum.at(sag, row.reshape(-1), off)
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     nearest = np.minimum(np.searchsorted(border, keys), len(border) - 1)
     return np.asarray(np.where(border[nearest] == keys, sag[nearest], 0.0).max(axis=1))

@@ -376,7 +376,7 @@ def test_a_corner_beside_its_faces_does_not_cut_their_triangles_for_ever():
 
 @pytest.mark.parametrize("lost", [1, 2, 3])
 def test_what_a_mesh_leaves_out_of_a_face_is_not_overlooked(lost, monkeypatch):
-    """As Open CASCADE does of slender plane faces: with finer edges it may not; if it always does nothing is known."""
+    """As Open CASCADE does of slender plane faces: with finer edges it may not, else corners are all that is known."""
     a, b = (to_bytes(solid) for solid in (block((0, 0, 0), (10, 10, 10)), block((1, 2, 9), (8, 7, 20))))
     meshed, calls = pairs.triangles_of, []
 
@@ -387,7 +387,7 @@ def test_what_a_mesh_leaves_out_of_a_face_is_not_overlooked(lost, monkeypatch):
 
     monkeypatch.setattr(pairs, "triangles_of", without_a_triangle)
     part = pairs.common(a, b, np.eye(4), 0.04)
-    if lost == 3:  # but what its corners attest
+    if lost == 3:
         monkeypatch.setattr(cad_process, "common", lambda *_: part)
         solids = (model_of(BrepSolid("part", brep, np.zeros((2, 3))), Counters()) for brep in (a, b))
         overlap = exact_overlap(*solids, np.eye(4), 0.04)

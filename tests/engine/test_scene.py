@@ -56,6 +56,15 @@ def test_contacts_of_fitted_meshes_are_those_of_their_parts(clamp):
         assert row.distance.lower <= 0.0 <= row.distance.upper < row.distance.lower + 0.01
 
 
+def test_nothing_is_meshed_where_closed_forms_decide(clamp):
+    scene = Scene(clearance=0.5).add("block", shapes.box((10, 10, 10)))
+    scene = scene.add("rod", shapes.cylinder(2.0, 10.0), translation(7.1, 0.0, 0.0))
+    for some in (scene, clamp):
+        result = check(some, depths=False)
+        assert result.pairs
+        assert (result.work.meshes, result.work.triangles) == (0, 0)
+
+
 def test_verdicts_in_a_crowd_are_those_of_measured_distances():
     scene, box = Scene(clearance=0.5), shapes.box((10, 10, 10))
     for k in range(10):
