@@ -72,22 +72,15 @@ class CadPair:
         self._attested = -probe.upper
         if probe.upper <= TOLERANCE and not (_may_be_ball(self.a) or _may_be_ball(self.b)):
             return  # they touch or overlap: of other bodies than balls Open CASCADE would say 0
+        at_most = probe.upper
+        if self._has_meshes and (self.a.is_free_form or self.b.is_free_form):
+            # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
+            at_most = min(at_most, self._coarse.upper)
+            for level, meshes in self._fine_meshes():
+                at_most = min(at_most, meshes.upper)
+                yield level, meshes
         distance = exact_distance(self.a, self.b, self.T)
-        unproven = replace(distance, lower=-np.inf)
-        if distance.lower > probe.upper:  # a point lies in both solids
-            distance = unproven
-        may_be_checked = self._has_meshes and np.isfinite(distance.lower)
-        if not (may_be_checked and (self.a.is_free_form or self.b.is_free_form)):
-            yield "exact", distance
-            return
-        # Of free-form faces it may take a gap for the least of several: meshes must not contradict that.
-        yield "exact", unproven
-        meshes = self._coarse
-        if self._may_mesh_finely:
-            meshes = self._fine_meshes_distance(FEW_CUTS)
-            yield "meshes", meshes
-        if distance.lower <= meshes.upper:
-            yield "exact", distance
+        yield "exact", distance if distance.lower <= at_most else replace(distance, lower=-np.inf)
 
     @cached_property
     def _nearby(self) -> tuple[IntArray, IntArray]:
@@ -142,7 +135,7 @@ class CadPair:
         try:
             if self._has_meshes:
                 near_a, near_b = self._nearby
-                a, b = self.a.outer_near(near_a), self.b.outer_near(near_b)
+                a, b = self.a.outer_near(near_a, CAD_CHORDS[-1]), self.b.outer_near(near_b, CAD_CHORDS[-1])
             else:  # coarse ones do not close: fine ones may
                 a, b = (model.outer(CAD_CHORDS[-1], thorough=True) for model in (self.a, self.b))
         except Clamp3dError:

@@ -13,7 +13,7 @@ import numpy as np
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.farthest import Pieces, farthest
 from clamp3d.engine.model import CAD_CHORDS, Model
-from clamp3d.engine.near_faces import near_faces
+from clamp3d.engine.near_faces import faces_nearby, near_faces
 from clamp3d.engine.overlap import common
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
@@ -57,19 +57,25 @@ def exact_distance(a: Model, b: Model, T: Array, most: float = np.inf) -> Distan
     return Distance(lower, gap + TOLERANCE, nearest.p, nearest.q, normal, method=METHOD)
 
 
-def exact_probe(a: Model, b: Model, T: Array, *, chord: float = np.inf, points_each: int = _PROBED) -> Distance:
+def exact_probe(a: Model, b: Model, T: Array, *, chord: float | None = None, points_each: int = _PROBED) -> Distance:
     """How deep some points of the common part of meshes lie in two solids that touch or overlap.
 
     The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
     Of triangles that do not close some corners are tried.
-    ``chord``: chord error (mm) of the meshes, that of the coarsest by default. ``points_each``: points that look
-    deepest in one solid, and in both.
+    ``chord``: chord error (mm) of the meshes where the solids are near each other; by default they are coarse.
+    ``points_each``: points that look deepest in one solid, and in both.
     """
     nothing = Distance(method=METHOD)
     if not (a.chords and b.chords):
-        points = _corners_in_both_boxes(a, b, T, min(CAD_CHORDS[0], chord))
+        points = _corners_in_both_boxes(a, b, T, chord or CAD_CHORDS[0])
         return attested_overlap(points, depths_in(a, b, T, points))
-    meshes = [model.outer(min(model.chords[0], chord), thorough=True) for model in (a, b)]
+    if chord is None:
+        meshes = [model.outer(CAD_CHORDS[0]) for model in (a, b)]
+    else:
+        assert a.face_meshes is not None
+        assert b.face_meshes is not None
+        on_a, on_b = faces_nearby(a.face_meshes, b.face_meshes, T)
+        meshes = [a.outer_near(on_a, chord), b.outer_near(on_b, chord)]
     shared = common(meshes[0], meshes[1], T)
     if shared is None:
         return nothing

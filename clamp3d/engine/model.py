@@ -156,8 +156,8 @@ class Model:
         """The same of a mesh that is fine on some of its faces, numbered (k,)."""
         raise NotImplementedError
 
-    def outer_near(self, faces: IntArray) -> Surface:
-        """Mesh of a solid from CAD that is fine on some of its faces, numbered (k,), and coarse elsewhere."""
+    def outer_near(self, faces: IntArray, chord: float) -> Surface:
+        """Mesh of a solid from CAD of chord error ``chord`` mm on some of its faces (k,), and coarse elsewhere."""
         raise NotImplementedError
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
@@ -319,11 +319,14 @@ class CadModel(Model):
         each = np.where(one_way, np.sqrt(finer), finer)
         return float(np.where(np.isin(coarse.face, faces), each, 1.0).sum())
 
-    def outer_near(self, faces: IntArray) -> Surface:
-        """Mesh that is fine on some of its faces, numbered (k,), and coarse elsewhere; Clamp3dError if it has gaps."""
+    def outer_near(self, faces: IntArray, chord: float) -> Surface:
+        """Mesh of chord error ``chord`` mm or finer on some of its faces, numbered (k,), and coarse elsewhere.
+
+        Raises Clamp3dError if it has gaps.
+        """
         if self._is_small:
             return self.outer(CAD_CHORDS[-1], thorough=True)
-        return _fine_mesh(self, tuple(faces.tolist()))
+        return _fine_mesh(self, tuple(faces.tolist()), chord)
 
     @cached_property
     def _is_small(self) -> bool:
@@ -374,9 +377,9 @@ class CadModel(Model):
 
 
 @lru_cache(maxsize=_KEPT)
-def _fine_mesh(model: CadModel, faces: tuple[int, ...]) -> Surface:
+def _fine_mesh(model: CadModel, faces: tuple[int, ...], chord: float) -> Surface:
     """The triangles of a solid that are fine on some of its faces; kept, but not all of those of a large assembly."""
-    mesh = model._closed(model.shape.tessellated_near(faces, CAD_CHORDS[-1]))
+    mesh = model._closed(model.shape.tessellated_near(faces, chord))
     model._count(mesh)
     return mesh
 

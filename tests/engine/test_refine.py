@@ -88,8 +88,12 @@ def cad_levels(monkeypatch):
 
 @pytest.mark.parametrize("found", [True, False])
 @pytest.mark.parametrize("deep", [5.0, 2e-4, 1e-4, 0.0, -1e-5, -math.inf])
-def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatch, found, deep):
-    """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more."""
+@pytest.mark.parametrize("free_form", [False, True])
+def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatch, free_form, found, deep):
+    """Of faces that coincide small meshes prove it first; a common part that was not found is asked for once more.
+
+    Meshes come before a distance to free-form faces, which they must not contradict.
+    """
 
     def overlap(a, b, T, share, *, end, quick=False, attested):
         assert attested == deep
@@ -106,14 +110,14 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
         faces_nearby=lambda a, b, T: ([a], [b]),
     )
     monkeypatch.setattr(refine, "_nearest_forms", lambda *_: Distance(method="forms"))
-    begin = ["sections", "probe", *["distance"] * (deep < 0.0)]
+    are_apart = deep < 0.0
     shares = ["0.04 True", *["0.015 False", "0.004 False"] * found]
     again = ["0.04 False", "0.015 False", "0.004 False"] * (not found)
     for chords, triangles, fine in (
-        ([(0.1, 0.0018), (0.1,)], 7_500, "near [1] 20000 near [2]"),
-        ([(0.1, 0.0018), (0.1, 0.0018)], 7_501, "near [1] 20000 near [2]"),
-        ([(0.1,), (0.1,)], 80_000, "near [1] 20000 near [2]"),
-        ([(0.1,), (0.1,)], 80_001, "near [1] 100000 near [2]"),
+        ([(0.1, 0.0018), (0.1,)], 7_500, "near [1] 0.0018 20000 near [2] 0.0018"),
+        ([(0.1, 0.0018), (0.1, 0.0018)], 7_501, "near [1] 0.0018 20000 near [2] 0.0018"),
+        ([(0.1,), (0.1,)], 80_000, "near [1] 0.0018 20000 near [2] 0.0018"),
+        ([(0.1,), (0.1,)], 80_001, "near [1] 0.0018 100000 near [2] 0.0018"),
         ([(), (0.1,)], 7_500, "whole 0.0018 100000 whole 0.0018"),
     ):
         a, b = (
@@ -125,20 +129,24 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
                 quick_bodies=(1,),
                 fine_triangles=triangles,
                 fine_triangles_near=lambda faces, triangles=triangles, k=k: triangles if faces == [k] else math.inf,
-                outer_near=lambda faces: f"near {faces}",
+                is_free_form=free_form and k == 2,
+                outer_near=lambda faces, chord: f"near {faces} {chord}",
                 outer=lambda chord, *, thorough: f"whole {chord if thorough else None}",
             )
             for k, some in enumerate(chords, 1)
         )
         coarse = ["0.1", "slab"] * all(chords)
         place = 3 if not all(chords) or triangles > 80_000 else 1 if triangles <= 7_500 and deep <= 1e-4 else 2
-        soon, later, last = ([fine] * (k == place) for k in (1, 2, 3))
+        if free_form and are_apart and all(chords) and triangles <= 80_000:
+            place = 0
+        first, soon, later, last = ([fine] * (k == place) for k in range(4))
         answers = [answer for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
         order = [
             answer.method if answer.point_a is None else " ".join(map(str, [*answer.point_a, *answer.point_b]))
             for answer in answers
         ]
-        assert order == [*coarse, *begin, *soon, *shares, "forms", *later, *again, *last]
+        begin = [*coarse, "sections", "probe", *first, *["distance"] * are_apart]
+        assert order == [*begin, *soon, *shares, "forms", *later, *again, *last]
         assert {x.method for x in answers if x.point_a} == {"meshes (FCL), chord error 0.0018 mm"}
         a.quick_bodies = None
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
