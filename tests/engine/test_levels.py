@@ -463,7 +463,7 @@ HOLDERS = [
 ]
 
 
-@QUICK
+@settings(QUICK, max_examples=6)
 @given(st.sampled_from(HOLDERS), st.floats(0.3, 11.0), st.floats(0.5, 80.0), st.integers(0, 10**6))
 def test_bounds_at_many_poses_hold_for_each_of_them(holder, radius, length, seed):
     """With single answers and with the bodies' definition; from the other body they are the same."""

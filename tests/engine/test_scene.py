@@ -147,7 +147,7 @@ HALF_ROD = shapes.extrusion(Profile((Arc((0.0, 0.0), 9.0, 0.0, math.pi), Segment
 def test_many_poses_have_the_verdicts_of_one_at_a_time(moving):
     """Nearly all overlaps are found in all poses at once; progress counts those that are looked at by themselves."""
     rng, stages, cache, alone = np.random.default_rng(5), [], ModelCache(), ModelCache()
-    poses = np.array([translation(*rng.uniform(-30, 30, 3)) @ rotation(rng.normal(size=3), 2.0) for _ in range(120)])
+    poses = np.array([translation(*rng.uniform(-30, 30, 3)) @ rotation(rng.normal(size=3), 2.0) for _ in range(60)])
     block = shapes.groove_block(SweptArc(8.0, 1.3, 50.0), 50.0, 30.0)
     scene = Scene().add("block", block).add("part", moving)
     sweep = check_poses(scene, "part", poses, progress=lambda *stage: stages.append(stage), cache=cache)

@@ -135,7 +135,7 @@ def truth(a, b):
     common = occ.BRepAlgoAPI_Common(a, b).Shape()
     if (shared := volume(common)) <= 1e-9:  # or the boolean has failed: ask some points
         return Truth(0.0, 0.0, max(deepest_corner(a, b), deepest_corner(b, a)))
-    return Truth(0.0, shared, max(deepest(common, x) for x in (a, b)))
+    return Truth(0.0, shared, deepest(common, a, b))
 
 
 def judged(verdict, lower, upper, known):
@@ -161,23 +161,24 @@ def write_step(parts, path):
     return tree.write(path)
 
 
-def deepest(common, solid):
-    """The largest distance that a corner of the common part's mesh has from the solid's boundary.
+def deepest(common, a, b):
+    """How deep a corner of the common part's mesh, which lies on the boundary of one solid, is in the other one.
 
-    All corners of a solid in its own place lie on that: then points half way between two of them count that are inside.
+    Where it lies beside its face by as much as the file's tolerance, it is not counted as so much deeper. All corners
+    of a solid in its own place lie on both: then points half way between two of them count that are inside.
     """
-    from_boundary, points = from_shell(solid), mesh_corners(common)
+    from_a, from_b, points = from_shell(a), from_shell(b), mesh_corners(common)
     points = points[:: max(1, len(points) // 60)]
-    depth = max((from_boundary(p) for p in points), default=0.0)
+    depth = max((abs(from_a(p) - from_b(p)) for p in points), default=0.0)
     if depth > 1e-6:
         return depth
-    place, inside = occ.BRepClass3d_SolidClassifier(solid), []
-    for a, b in itertools.combinations(points[::4], 2):
-        middle = occ.gp_Pnt(*(0.5 * (np.array(a.Coord()) + b.Coord())))
+    place, inside = occ.BRepClass3d_SolidClassifier(a), []
+    for p, q in itertools.combinations(points[::4], 2):
+        middle = occ.gp_Pnt(*(0.5 * (np.array(p.Coord()) + q.Coord())))
         place.Perform(middle, 1e-7)
         if place.State() == occ.TopAbs_State.TopAbs_IN:
             inside.append(middle)
-    return max(map(from_boundary, inside), default=depth)
+    return max(map(from_a, inside), default=depth)
 
 
 def deepest_corner(a, b):

@@ -20,7 +20,7 @@ import umsgpack
 from scipy.spatial.transform import Rotation
 
 import clamp3d.output.viewer
-from clamp3d import InputError, Motion, Scene, assemble, load_clamp, measure, shapes, view
+from clamp3d import InputError, Motion, Scene, measure, shapes, view
 from clamp3d.clamp.result import HELD_ON_AXIS
 from clamp3d.engine.check import check
 from clamp3d.errors import Clamp3dError
@@ -48,12 +48,13 @@ def test_text_and_page_print_the_same_tilt_and_no_negative_zero(tilt, printed, r
 
 
 @pytest.fixture(scope="module")
-def recorded():
+def recorded(run):
     """The viewer of the reference clamp, and its assembly."""
-    viewer = Viewer(ClampStory(load_clamp()), mesh_error=0.1)
-    assembly = assemble("reference", on_waypoint=viewer.show)
-    viewer.finish(assembly)
-    return viewer, assembly
+    viewer = Viewer(ClampStory(run.clamp), mesh_error=0.1)
+    for waypoint in run.path:
+        viewer.show(waypoint)
+    viewer.finish(run)
+    return viewer, run
 
 
 def plate_and_pin():
