@@ -51,7 +51,7 @@ class CadPair:
             yield "meshes", self._coarse
             slab = slab_distance(self.a, self.b, self.T, self.enough)
             if slab is not None:
-                yield "boxes", slab
+                yield "flat faces", slab
         sections = coaxial_distance(self.a, self.b, self.T, self.enough)
         if sections is not None:
             yield "sections", sections

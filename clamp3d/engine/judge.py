@@ -34,7 +34,7 @@ def judge(
     if a is b and (apart := _moved_by(a, T)) <= thresholds.contact:  # equal shapes share their model
         verdict = Verdict.ALLOWED if allowance == np.inf else Verdict.DUPLICATE
         # Each point of one lies so near to the same point of the other.
-        return verdict, replace(start, lower=-np.inf, upper=apart, level="boxes", method="equal shapes")
+        return verdict, replace(start, lower=-np.inf, upper=apart, level="equal shapes", method="equal shapes")
 
     def certain(distance: Distance) -> bool:
         return enough(distance) and thresholds.verdict(distance, allowance) is not Verdict.UNCERTAIN
