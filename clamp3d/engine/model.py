@@ -9,7 +9,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,8 +46,6 @@ _LARGE = 2000
 """Triangles of a mesh beyond which its hull is no quicker to ask than the mesh itself."""
 MOST_FINE = 80_000
 """Triangles beyond which the fine mesh of a solid from CAD costs more than asking Open CASCADE."""
-_KEPT = 32
-"""Meshes that are fine near other solids which are kept: of poses along a motion most are the same."""
 _CONVEX = 1e-9
 """Relative to its size: a mesh whose hull stands out of it by less is asked in its place."""
 _SHARPEST = 0.02
@@ -276,6 +274,8 @@ class CadModel(Model):
     def __init__(self, shape: BrepSolid, counters: Counters) -> None:
         super().__init__(shape, counters)
         self.exact = shape
+        # Poses along a motion mostly have the same faces near: more of these meshes would fill the memory.
+        self._last_near: tuple[tuple[tuple[int, ...], float], Surface] | None = None
 
     @property
     def bounds(self) -> Array:
@@ -326,7 +326,12 @@ class CadModel(Model):
         """
         if self._is_small:
             return self.outer(CAD_CHORDS[-1], thorough=True)
-        return _fine_mesh(self, tuple(faces.tolist()), chord)
+        key = tuple(faces.tolist()), chord
+        if self._last_near is None or self._last_near[0] != key:
+            mesh = self._closed(self.shape.tessellated_near(*key))
+            self._count(mesh)
+            self._last_near = key, mesh
+        return self._last_near[1]
 
     @cached_property
     def _is_small(self) -> bool:
@@ -374,14 +379,6 @@ class CadModel(Model):
         if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
             raise Clamp3dError(f"the triangles of {self.name} do not close")
         return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
-
-
-@lru_cache(maxsize=_KEPT)
-def _fine_mesh(model: CadModel, faces: tuple[int, ...], chord: float) -> Surface:
-    """The triangles of a solid that are fine on some of its faces; kept, but not all of those of a large assembly."""
-    mesh = model._closed(model.shape.tessellated_near(faces, chord))
-    model._count(mesh)
-    return mesh
 
 
 class MeshModel(Model):

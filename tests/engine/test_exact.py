@@ -1,6 +1,8 @@
 """Two solids from CAD by Open CASCADE: the bounds of an interference hold what a formula says."""
 
+import gc
 import itertools
+import weakref
 from dataclasses import replace
 from functools import cache
 
@@ -13,6 +15,7 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 from clamp3d import check
 from clamp3d.engine import cad_pair, moving_pair
 from clamp3d.engine import depth as depth_module
+from clamp3d.engine import model as model_module
 from clamp3d.engine import near_faces as near_faces_module
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.cad_pair import CadPair
@@ -51,6 +54,19 @@ def models(family, gap, seed=3, splines=0.0):
 
 def models_of(*solids):
     return [cad_model(solid) for solid in solids]
+
+
+def test_a_mesh_that_is_fine_on_some_faces_is_made_once_and_goes_with_its_solid(monkeypatch):
+    monkeypatch.setattr(model_module, "QUICK_TRIANGLES", 0)
+    (solid,) = models_of(rod(3.0, 0.0, 8.0))
+    mesh, coarser = (solid.outer_near(np.array([0]), chord) for chord in (0.01, 0.05))
+    assert len(mesh.faces) > len(coarser.faces)
+    assert solid.outer_near(np.array([0]), 0.05) is coarser
+    assert solid.counters.built["meshes"] == 2
+    left = weakref.ref(coarser)
+    del mesh, coarser, solid
+    gc.collect()
+    assert left() is None
 
 
 @pytest.mark.parametrize("family", FAMILIES)
