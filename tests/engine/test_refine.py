@@ -1,5 +1,6 @@
 """How answers of several levels and of several bodies become one: agreement, order, and what counts as known."""
 
+import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -150,6 +151,41 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
         assert {x.method for x in answers if x.point_a} == {"meshes (FCL), chord error 0.0018 mm"}
         a.quick_bodies = None
         assert "forms" not in [answer.method for _, answer in refine._levels(a, b, np.eye(4), lambda _: False, False)]
+
+
+@pytest.mark.parametrize(
+    ("is_free_form", "probe", "coarse", "fine", "lower"),
+    [
+        (True, 9.0, 8.0, 7.0, 5.0),
+        (True, 9.0, 8.0, 4.9, -math.inf),  # a gap that Open CASCADE takes for the least, and is not
+        (True, 9.0, 4.9, 8.0, -math.inf),
+        (False, 9.0, 4.9, 4.9, 5.0),
+        (False, 4.9, 8.0, 7.0, -math.inf),  # a point lies in both: by that much
+    ],
+)
+def test_a_distance_that_meshes_or_points_contradict_bounds_nothing_from_below(
+    cad_levels, is_free_form, probe, coarse, fine, lower
+):
+    cad_levels(
+        -probe,
+        slab_distance=lambda *_: None,
+        meshes_distance=lambda *_: Distance(-1.0, coarse),
+        surface_distance=lambda *_: Distance(-1.0, fine),
+        exact_distance=lambda *_: Distance(5.0, 5.0, method="distance"),
+        faces_nearby=lambda *_: ([], []),
+    )
+    solid = SimpleNamespace(
+        exact=1,
+        is_simple=True,
+        chords=(0.1,),
+        face_meshes=1,
+        is_free_form=is_free_form,
+        fine_triangles_near=lambda _: 10_000,
+        outer_near=lambda *_: None,
+    )
+    answers = cad_pair.CadPair(solid, solid, np.eye(4), lambda _: False).levels(iter(()))
+    (distance,) = itertools.islice((answer for _, answer in answers if answer.method == "distance"), 1)
+    assert (distance.lower, distance.upper) == (lower, 5.0)
 
 
 def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshes_that_fail_say_nothing(cad_levels):
