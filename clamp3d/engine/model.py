@@ -275,7 +275,7 @@ class CadModel(Model):
         super().__init__(shape, counters)
         self.exact = shape
         # Poses along a motion mostly have the same faces near: more of these meshes would fill the memory.
-        self._last_near: tuple[tuple[tuple[int, ...], float], Surface] | None = None
+        self._last_near: dict[float, tuple[tuple[int, ...], Surface]] = {}
 
     @property
     def bounds(self) -> Array:
@@ -326,12 +326,12 @@ class CadModel(Model):
         """
         if self._is_small:
             return self.outer(CAD_CHORDS[-1], thorough=True)
-        key = tuple(faces.tolist()), chord
-        if self._last_near is None or self._last_near[0] != key:
-            mesh = self._closed(self.shape.tessellated_near(*key))
+        numbers = tuple(faces.tolist())
+        if chord not in self._last_near or self._last_near[chord][0] != numbers:
+            mesh = self._closed(self.shape.tessellated_near(numbers, chord))
             self._count(mesh)
-            self._last_near = key, mesh
-        return self._last_near[1]
+            self._last_near[chord] = numbers, mesh
+        return self._last_near[chord][1]
 
     @cached_property
     def _is_small(self) -> bool:

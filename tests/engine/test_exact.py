@@ -61,10 +61,11 @@ def test_a_mesh_that_is_fine_on_some_faces_is_made_once_and_goes_with_its_solid(
     (solid,) = models_of(rod(3.0, 0.0, 8.0))
     mesh, coarser = (solid.outer_near(np.array([0]), chord) for chord in (0.01, 0.05))
     assert len(mesh.faces) > len(coarser.faces)
-    assert solid.outer_near(np.array([0]), 0.05) is coarser
+    for chord, made in ((0.05, coarser), (0.01, mesh)):
+        assert solid.outer_near(np.array([0]), chord) is made
     assert solid.counters.built["meshes"] == 2
     left = weakref.ref(coarser)
-    del mesh, coarser, solid
+    del mesh, coarser, made, solid
     gc.collect()
     assert left() is None
 
@@ -78,9 +79,10 @@ def test_an_interference_is_within_its_bounds_however_coarse_the_border_is(famil
         assert distance.lower <= -0.06 <= distance.upper <= distance.lower + width
 
 
-def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_its_way_out(monkeypatch):
+@pytest.mark.parametrize("family", ["taper_in_hub", "ring_in_groove"])
+def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_its_way_out(family, monkeypatch):
     """By meshes where Open CASCADE finds no common part, as is the volume; their sections are not asked here."""
-    a, b = models("taper_in_hub", -0.04)
+    a, b = models(family, -0.04)
     monkeypatch.setattr(depth_module, "coaxial_distance", lambda *_: None)
     volume = cad_process.common(a.exact.brep, b.exact.brep, np.eye(4)).volume
     for found in (True, False):
@@ -94,7 +96,7 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
         assert 0.035 < least <= 0.04 <= most  # points attest it exactly, also where no common part is found
         assert -distance.lower > 0.5
         assert ("CASCADE" in distance.method) is found
-        assert most < (0.05 if found else 0.06)
+        assert most < (0.05 if found else 0.06 if family == "taper_in_hub" else np.inf)
 
 
 def test_where_no_meshes_overlap_the_depth_is_that_of_a_point_and_no_way_out_is_known(monkeypatch):
@@ -333,8 +335,9 @@ def test_the_border_of_a_common_part_may_go_over_into_a_fillet():
     assert -0.0098 <= distance.lower <= -0.0094 <= distance.upper <= -0.0093
 
 
-def test_a_bound_of_an_interference_is_no_sharper_than_what_is_to_be_decided():
-    a, b = models("screw_in_plate", -0.0085, seed=5)
+@pytest.mark.parametrize("family", ["hexagon_in_bore", "screw_in_plate"])
+def test_a_bound_of_an_interference_is_no_sharper_than_what_is_to_be_decided(family):
+    a, b = models(family, -0.0085, seed=5)
     for share, most in itertools.product(SHARES[1:], (0.02, 0.0097)):
         distance = exact_overlap(a, b, np.eye(4), share, end=lambda bounds, _, m=most: bounds.lower >= -m)
         assert -most <= distance.lower <= -0.0085 <= distance.upper
@@ -504,16 +507,12 @@ def test_a_ball_is_as_far_as_its_centre_less_its_radius(known, monkeypatch):
     assert missed <= (0 if known else 12)
 
 
-@pytest.mark.parametrize(
-    ("family", "splines"),
-    # Open CASCADE takes seconds where a ball is concentric with a socket of splines.
-    [
-        ("ball_in_socket", 0.0),
-        *itertools.product(("balls", "ball_on_plate", "ball_in_cone", "ball_in_ring"), (0.0, 1.0)),
-    ],
-)
+@pytest.mark.parametrize("splines", [0.0, 1.0])
+@pytest.mark.parametrize("family", ["balls", "ball_on_plate", "ball_in_socket", "ball_in_cone", "ball_in_ring"])
 def test_the_overlap_of_a_ball_is_its_radius_less_the_distance_of_its_centre(family, splines):
-    for seed, gap in ((1, -0.0098), (2, -1e-4), (3, 0.0), (4, 0.03)):
+    # Open CASCADE takes seconds where a ball is concentric with a socket of splines.
+    count = 1 if family == "ball_in_socket" and splines else 4
+    for seed, gap in ((1, -0.0098), (2, -1e-4), (3, 0.0), (4, 0.03))[:count]:
         a, b = models(family, gap, seed, splines)
         distance = exact_distance(a, b, np.eye(4))
         assert distance.lower <= gap <= distance.upper
