@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -191,6 +192,17 @@ def test_what_is_left_of_a_thin_lune_is_polygons(side):
     assert all(piece.geom_type == "Polygon" and piece.area > 0.0 for piece in pieces)
     area = shapely.union_all(pieces).area
     assert area < profile.area if side == "inner" else area > profile.area
+
+
+def test_of_chords_that_run_back_over_each_other_no_line_is_left():
+    """A square with a horn so thin that both of its sides have the same chord."""
+    corners = [(0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (24.0, 8.0), (0.0, 8.0)]
+    pieces = shapely.make_valid(Polygon(corners)).geoms
+    assert [piece.geom_type for piece in pieces] == ["Polygon", "LineString"]
+    horn = SimpleNamespace(polygon=lambda mesh_error, side="chords": np.array(corners), arcs=())
+    (square,) = _polygons(horn, 0.1, "outer")
+    assert square.bounds == (0.0, 0.0, 8.0, 8.0)
+    assert square.area == 64.0
 
 
 def test_hexagons_and_rectangles_have_their_sides():
