@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from clamp3d.baselines.cas import Cas
 from clamp3d.baselines.model import ContactModel
@@ -88,44 +89,65 @@ def assemble(
     """
     clamp, model = load_clamp(clamp, line=line, jumper=jumper), model or Cas()
     choice("solver", solver, ("exact", "stepped", "bisection"))
-    step, tilt_step = array("moves", moves, (2,), finite=False).tolist()
+    moves = tuple(array("moves", moves, (2,), finite=False).tolist())
     function("on_waypoint", on_waypoint)
     function("progress", progress)
     if sequence is not None:
         clamp = replace(clamp, sequence=text("sequence", sequence))
     steps, section = parse_sequence(clamp.sequence), Section(clamp, model)
-    resolution = {"exact": TOUCHING, "stepped": step, "bisection": 10.0 * RESOLUTION}[solver]
-    log, start = Log(section, on_waypoint), open_start(section)
+    log = Log(section, on_waypoint)
+    closed = _close(section, solver, moves, progress)
+    play(steps, closed.motions, log)
+    contacts = measure_contacts(clamp, section.poses(closed.final.q), model, cache=log.cache)
+    _add_silent_contacts(log, steps, closed, contacts)
+    return _assembly(section, closed, contacts, log, others)
+
+
+class _Closed(NamedTuple):
+    """A closed clamp: its state, that again if it is proven, the motions to it, and to how many mm they are known."""
+
+    solver: Solver
     final: FinalState | SteppedState
+    proven: FinalState | None
+    motions: Closing
+    resolution: float
+
+
+def _close(
+    section: Section, solver: Solver, moves: tuple[float, float], progress: Callable[[int, float], None] | None
+) -> _Closed:
+    """Close a clamp from its open state."""
+    start = open_start(section)
     if solver == "exact":
         met: Meetings = []
-        final = proven = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
+        final = solve_final_state(section, start, on_contact=lambda pair, q: met.append((pair, q)))
         met = [(pair, q) for pair, q in met if pair not in (("P1", "P6"), ("P1", "P7"))]
-        closing = Closing(start, final.held, final.q, met)
-    else:
-        until = {"stepped": math.inf, "bisection": RESOLUTION}[solver]
-        final = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
-        proven, closing = None, Closing(start, final.q, final.q, [])
-    play(steps, closing, log)
-    poses = section.poses(final.q)
-    contacts = measure_contacts(clamp, poses, model, cache=log.cache)
-    _add_silent_contacts(log, steps, closing, contacts, resolution)
-    queries = section.queries  # what the assembly itself asked, without the other equilibria
+        return _Closed(solver, final, final, Closing(start, final.held, final.q, met), TOUCHING)
+    step, tilt_step = moves
+    resolution, until = (step, math.inf) if solver == "stepped" else (10.0 * RESOLUTION, RESOLUTION)
+    tried = solve_stepped(section, step=step, tilt_step=tilt_step, resolution=until, progress=progress)
+    return _Closed(solver, tried, None, Closing(start, tried.q, tried.q, []), resolution)
+
+
+def _assembly(section: Section, closed: _Closed, contacts: tuple[Contact, ...], log: Log, others: bool) -> Assembly:
+    """What was measured of a closed clamp; with ``others`` also where else it can close to."""
+    clamp, model, queries = section.clamp, section.model, section.queries  # of the assembly itself, without others
+    final, proven, start = closed.final, closed.proven, closed.motions.start
     return Assembly(
         clamp=clamp,
         model=model,
-        solver=solver,
-        closing_status=closing_status(section, final, resolution),
+        solver=closed.solver,
+        closing_status=closing_status(section, final, closed.resolution),
         distance=section.splint_distance(final.q),
         closing=section.down_splint(final.q).y,
         tilt=float(final.q[S]) / section.lever,
-        turns=clamp.bolt.turn(closing.travel) / (2.0 * math.pi),
-        poses=poses,
+        turns=clamp.bolt.turn(closed.motions.travel) / (2.0 * math.pi),
+        poses=section.poses(final.q),
         contacts=contacts,
         events=tuple(log.events),
         path=tuple(log.path),
         undeclared=_undeclared(clamp, contacts, log),
-        resolution=resolution,
+        resolution=closed.resolution,
         violation=proven.violation if proven else None,
         optimality=proven.optimality if proven else None,
         work=Work(len(PARTS), len(PAIRS), queries, getattr(final, "motion_steps", 0), model.meshes_built),
@@ -136,15 +158,14 @@ def assemble(
     )
 
 
-def _add_silent_contacts(
-    log: Log, steps: tuple[Step, ...], closing: Closing, contacts: Sequence[Contact], resolution: float
-) -> None:
+def _add_silent_contacts(log: Log, steps: tuple[Step, ...], closed: _Closed, contacts: Sequence[Contact]) -> None:
     """Add to the events what touches in the end though no force says when, and put them in order."""
+    travel = float(closed.motions.start[D] - closed.motions.held[D])
     names, logged = [step.name for step in steps], {(e.a, e.b) for e in log.events}
     closes = next(step.name for step in steps if step.kind != "bring")
     for c in contacts:
-        if c.gap <= resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in logged:
-            log.events.append(Event(closes, c.a, c.b, c.relation, c.point, float(closing.start[D] - closing.held[D])))
+        if c.gap <= closed.resolution and (c.declared or c.type) not in (0, 1) and (c.a, c.b) not in logged:
+            log.events.append(Event(closes, c.a, c.b, c.relation, c.point, travel))
     log.events.sort(key=lambda e: (names.index(e.step), e.travel))
 
 
