@@ -25,7 +25,7 @@ import math
 import os
 import time
 from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -43,24 +43,6 @@ _RUN = f"{__name__}:run_coacd"
 
 
 @dataclass(frozen=True, slots=True)
-class DecompositionParameters:
-    """CoACD's own parameters under their own names; all others are left as CoACD has them. Raises InputError.
-
-    ``threshold`` in mm with ``real_metric``, else on CoACD's normalised scale (0.01 to 1; its default is 0.05).
-    """
-
-    threshold: float = 2.0
-    real_metric: bool = True
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.threshold) and self.threshold > 0.0):
-            raise InputError(f"threshold must be > 0, got {self.threshold}")
-        if not self.real_metric and self.threshold > 1.0:
-            raise InputError(f"threshold must be <= 1 without real_metric, got {self.threshold}")
-
-
-@dataclass(frozen=True, slots=True)
 class Decomposition:
     """Corners (n, 3) of each hull, mm; ``seconds`` is CoACD's time, also where ``cached`` says that this was before."""
 
@@ -72,7 +54,7 @@ class Decomposition:
 def decompose(
     vertices: ArrayLike,
     faces: ArrayLike,
-    parameters: DecompositionParameters | None = None,
+    threshold: float,
     *,
     name: str = "mesh",
     time_limit: float = 300.0,
@@ -86,9 +68,11 @@ def decompose(
     in time or ends without an answer.
     """
     solid = closed_mesh(vertices, faces, name)
+    if not (math.isfinite(threshold) and threshold > 0.0):
+        raise InputError(f"threshold must be > 0, got {threshold}")
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
-    settings = asdict(parameters or DecompositionParameters())
+    settings = {"threshold": threshold, "real_metric": True, "seed": 0}
     kept = _cache_file(solid, settings)
     with suppress(Exception):  # no file; a damaged one can raise anything
         return _decomposition(dict(np.load(kept, allow_pickle=False)), True)
@@ -97,8 +81,7 @@ def decompose(
             arrays = worker.call(_RUN, solid.vertices, solid.faces, settings, time_limit=time_limit)
     except WorkerTimeoutError:
         raise SolverError(
-            f"CoACD did not finish {name} in {time_limit:g} s at threshold {settings['threshold']:g}; "
-            "raise time_limit or threshold"
+            f"CoACD did not finish {name} in {time_limit:g} s at threshold {threshold:g}; raise time_limit or threshold"
         ) from None
     except (WorkerEndedError, RuntimeError, MemoryError) as error:
         raise SolverError(f"CoACD gave no hulls for {name}: {error or 'out of memory'}") from None

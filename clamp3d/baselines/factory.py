@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from clamp3d.errors import InputError
 
 if TYPE_CHECKING:
-    from clamp3d.baselines.decomposition import DecompositionParameters
     from clamp3d.baselines.model import ContactModel
     from clamp3d.geometry.shapes import Solid
 
@@ -30,7 +29,7 @@ def contact_model(
     parts: Mapping[str, Solid] | None = None,
     *,
     unit_angle: float | None = None,
-    threshold: float | DecompositionParameters | None = None,
+    threshold: float | None = None,
     mesh_error: float | None = None,
     progress: bool | None = None,
     time_limit: float = 300.0,
@@ -45,7 +44,7 @@ def contact_model(
         Grooved parts by name, in their own frames, mm, for wedges, hulls and mesh; cut or meshed when first measured.
     unit_angle : float, optional
         Largest angle of a chord in rad, for chords and wedges; 5 degrees by default.
-    threshold : float or DecompositionParameters, optional
+    threshold : float, optional
         Concavity in mm that CoACD may leave, for hulls; 2 mm by default.
     mesh_error : float, optional
         Chord error in mm of the meshes, for hulls and mesh; 0.05 mm by default.

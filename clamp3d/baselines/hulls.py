@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from clamp3d.baselines.decomposition import Decomposition, DecompositionParameters, decompose
+from clamp3d.baselines.decomposition import Decomposition, decompose
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
 from clamp3d.geometry.meshing import mesh
@@ -23,8 +23,8 @@ class Hulls(PolytopeModel):
     ----------
     parts : mapping of str to Solid
         Grooved parts by name, mm. A part is meshed when it is first measured.
-    threshold : float or DecompositionParameters
-        Concavity in mm that CoACD may leave, or CoACD's settings.
+    threshold : float
+        Concavity in mm that CoACD may leave.
     mesh_error : float
         Chord error in mm of the meshes.
     time_limit, progress
@@ -41,24 +41,21 @@ class Hulls(PolytopeModel):
     def __init__(
         self,
         parts: Mapping[str, Solid],
-        threshold: float | DecompositionParameters = 2.0,
+        threshold: float = 2.0,
         *,
         mesh_error: float = 0.05,
         time_limit: float = 300.0,
         progress: bool | None = None,
     ) -> None:
         super().__init__(parts)
-        if not isinstance(threshold, DecompositionParameters):
-            threshold = DecompositionParameters(threshold=threshold)
-        self.parameters = threshold
-        self.mesh_error, self.time_limit, self.progress = mesh_error, time_limit, progress
+        self.threshold, self.mesh_error, self.time_limit, self.progress = threshold, mesh_error, time_limit, progress
         self.decompositions: dict[str, Decomposition] = {}
 
     def cut(self, name: str, part: Solid) -> Polytopes:
         """See `PolytopeModel`."""
         whole = mesh(part, self.mesh_error)
         limits: dict[str, Any] = {"time_limit": self.time_limit, "progress": self.progress}
-        self.decompositions[name] = decompose(whole.vertices, whole.faces, self.parameters, name=name, **limits)
+        self.decompositions[name] = decompose(whole.vertices, whole.faces, self.threshold, name=name, **limits)
         hulls = self.decompositions[name].hulls
         names = [f"hull {i + 1}" for i in range(len(hulls))]
         shapes = [convex(corners, f"{name} {n}") for corners, n in zip(hulls, names, strict=True)]

@@ -16,7 +16,7 @@ from clamp3d.baselines.model import check_unit_angle
 from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
 from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.profile import Arc, Segment, chord_count, turns
+from clamp3d.geometry.profile import Arc, Profile, Segment, chord_count, turns
 from clamp3d.geometry.shapes import Solid
 
 _BACK_ERROR = 0.01
@@ -81,7 +81,8 @@ def part_wedges(part: Solid, unit_angle: float) -> list[Wedge]:
         raise InputError(f"part {part.name} must have a groove to be cut into wedges")
     if any(abs(math.cos(0.5 * (arc.start_angle + arc.end_angle))) > _SAME for arc in grooves):
         raise InputError(f"part {part.name} must have grooves that open up or down to be cut into wedges")
-    corners = _filled(edges)
+    mouths = (Segment(e.start, e.end) if isinstance(e, Arc) and e.sweep < 0.0 else e for e in edges)
+    corners = Profile(tuple(mouths)).polygon(_BACK_ERROR)  # every groove closed by its mouth
     filled = shapely.Polygon(corners)
     left, bottom, right, top = filled.bounds
     between = [0.5 * (_mouth(a)[1] + _mouth(b)[0]) for a, b in pairwise(grooves)]
@@ -119,17 +120,6 @@ def _sectors(cell: shapely.Polygon, arc: Arc, unit_angle: float) -> list[Wedge]:
         for name, polygon in pieces
         if isinstance(polygon, shapely.Polygon) and polygon.area > _SLIVER
     ]
-
-
-def _filled(edges: tuple[Segment | Arc, ...]) -> Array:
-    """Corners (k, 2) of the outline with every groove closed by its mouth and every convex arc as fine chords."""
-    corners: list[tuple[float, float]] = []
-    for edge in edges:
-        if isinstance(edge, Arc) and edge.sweep > 0.0:
-            corners += edge.chords(_BACK_ERROR, edge.start)
-        else:
-            corners.append(edge.start)
-    return np.array(corners)
 
 
 def _inward_corners(polygon: Array) -> list[float]:

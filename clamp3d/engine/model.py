@@ -328,7 +328,7 @@ class CadModel(Model):
             return self.outer(CAD_CHORDS[-1], thorough=True)
         numbers = tuple(faces.tolist())
         if chord not in self._last_near or self._last_near[chord][0] != numbers:
-            mesh = self._closed(self.shape.tessellated_near(numbers, chord))
+            mesh = self._closed(cad_process.tessellate_finely(self.shape.brep, chord, numbers))
             self._count(mesh)
             self._last_near[chord] = numbers, mesh
         return self._last_near[chord][1]

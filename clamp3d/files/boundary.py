@@ -53,8 +53,9 @@ class Boundary:
 
     def foot(self, point: Array) -> Foot:
         """What of the surface is nearest to a point (3,). Raises Clamp3dError if Open CASCADE finds nothing."""
+        vertex = occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
         for search in self._searches:
-            search.LoadS2(vertex(point))
+            search.LoadS2(vertex)
             if not search.Perform() or search.NbSolution() < 1:
                 raise Clamp3dError("Open CASCADE finds no distance of a point from the solid")
         nearest = min(self._searches, key=lambda search: search.Value())
@@ -113,11 +114,6 @@ class Boundary:
     @cached_property
     def _classifier(self) -> Any:
         return occ.BRepClass3d_SolidClassifier(self._solid)
-
-
-def vertex(point: Array) -> Any:
-    """A point (3,) as a TopoDS_Vertex."""
-    return occ.BRepBuilderAPI_MakeVertex(occ.gp_Pnt(*point.tolist())).Vertex()
 
 
 def _nearest_parameters(surface: Any, uv: Array, point: Array) -> Array:

@@ -5,6 +5,7 @@ The caller and the process exchange pickles over pipes. What a library prints is
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import pickle
@@ -191,6 +192,7 @@ def serve(*, confined: bool) -> None:
     incoming, outgoing = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)  # what a library prints goes to the log
+    gc.set_threshold(100_000)  # what libraries load is no garbage
     if confined:
         sys.addaudithook(_refuse)
     requests: queue.SimpleQueue[tuple[str, tuple[Any, ...], float | None, float | None]] = queue.SimpleQueue()

@@ -70,13 +70,7 @@ def surfaces_of(faces: list[Any]) -> Surfaces:
     for face in faces:
         kind, frame, size = _canonical(face)
         rows.append((kind, frame, size, 1.0 if kind == OTHER else _sense(face, kind, frame, size)))
-    kinds, frames, sizes, senses = zip(*rows, strict=True) if rows else ((), (), (), ())
-    return Surfaces(
-        np.array(kinds, dtype=np.int64),
-        np.array(frames).reshape(-1, 4, 3),
-        np.array(sizes).reshape(-1, 2),
-        np.array(senses),
-    )
+    return Surfaces(*map(np.array, zip(*rows, strict=True)))
 
 
 def _canonical(face: Any) -> tuple[int, Array, Array]:
@@ -129,13 +123,11 @@ def _sense(face: Any, kind: int, frame: Array, size: Array) -> float:
     surface = occ.BRepAdaptor_Surface(face)
     u = 0.5 * (surface.FirstUParameter() + surface.LastUParameter())
     v = 0.5 * (surface.FirstVParameter() + surface.LastVParameter())
-    point, along_u, along_v = occ.gp_Pnt(), occ.gp_Vec(), occ.gp_Vec()
-    surface.D1(u, v, point, along_u, along_v)
-    step = np.array(along_u.Crossed(along_v).Coord())
-    step *= _STEP / max(float(np.linalg.norm(step)), 1e-300)
+    point, normal = occ.gp_Pnt(), occ.gp_Vec()
+    occ.BRepGProp_Face(face).Normal(u, v, point, normal)
+    step = np.array(normal.Coord()) * (_STEP / max(normal.Magnitude(), 1e-300))
     below, above = height(kind, frame, size, np.array(point.Coord()) + np.array([-step, step]))
-    is_outward = face.Orientation() != occ.TopAbs_Orientation.TopAbs_REVERSED
-    return 1.0 if is_outward is bool(above > below) else -1.0
+    return 1.0 if above > below else -1.0
 
 
 def points_on(face: Any, uv: Array) -> Array:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import io
-import sys
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
@@ -41,24 +39,12 @@ occ: Any = _OpenCascade()
 def require_open_cascade() -> Any:
     """Open CASCADE, kept from printing on stdout. Raises MissingLibraryError if it is not installed."""
     try:
-        OCP = sys.modules.get("OCP") or _loaded()
+        import OCP
     except ImportError:
         raise MissingLibraryError("STEP needs Open CASCADE: pip install 'clamp3d[step]'") from None
     messenger = OCP.Message.Message.DefaultMessenger_s()
     for printer in [*messenger.Printers()]:
         messenger.RemovePrinter(printer)
-    return OCP
-
-
-def _loaded() -> Any:
-    collects = gc.isenabled()
-    gc.disable()  # its thousands of classes are no garbage: to look for some among them takes as long as to load them
-    try:
-        import OCP
-    finally:
-        if collects:
-            gc.enable()
-    gc.freeze()
     return OCP
 
 

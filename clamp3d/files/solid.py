@@ -9,13 +9,11 @@ import numpy as np
 
 from clamp3d.files import cad_process
 from clamp3d.files.faces import OTHER, Surfaces
-from clamp3d.files.open_cascade import bounds_of, from_bytes, require_open_cascade, to_bytes
+from clamp3d.files.open_cascade import bounds_of, to_bytes
 from clamp3d.files.tessellation import Tessellation
 from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
-
-__all__ = ["CHORD", "BrepSolid", "require_open_cascade"]
 
 CHORD = 0.02
 """Chord error (mm) of ``mesh``."""
@@ -60,11 +58,6 @@ class BrepSolid(MeshShape):
         return cls(name, to_bytes(solid), bounds_of(solid))
 
     @cached_property
-    def solid(self) -> Any:
-        """The TopoDS_Shape, in this process. Raises MissingLibraryError without Open CASCADE."""
-        return from_bytes(self.brep)
-
-    @cached_property
     def surfaces(self) -> Surfaces:
         """The surfaces of its faces."""
         return cad_process.surfaces(self.brep)
@@ -75,10 +68,6 @@ class BrepSolid(MeshShape):
             make = cad_process.tessellate if chord >= CHORD else cad_process.tessellate_finely
             self._tessellations[chord] = make(self.brep, chord)
         return self._tessellations[chord]
-
-    def tessellated_near(self, faces: tuple[int, ...], chord: float) -> Tessellation:
-        """Triangles within about ``chord`` mm of the faces with these numbers, and coarse ones of all others."""
-        return cad_process.tessellate_finely(self.brep, chord, faces)
 
     def tops(self, direction: Array, faces: IntArray) -> Array:
         """How high (k,) mm faces numbered (k,) reach along a unit vector (3,); infinite for splines: not certain."""

@@ -45,7 +45,7 @@ _MOST_PLACES = 20_000
 _DIGITS = 9
 """Decimals (mm) to which points are one vertex."""
 _EDGE = 1e-9
-"""How far beside a triangle, relative to it, a place is still in it: none falls between two."""
+"""How far beside a triangle, relative to the parameters, a place is still in it: none falls between two."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,21 +225,11 @@ def _overlooked(face: Any, kind: int, points: Array, triangles: IntArray, uv: Ar
 
 def _inside(places: Array, triangles: Array) -> tuple[IntArray, IntArray]:
     """Numbers (k,) of places (n, 2) of the plane, and of the triangles (m, 3, 2) that each of them is in."""
-    if not len(places):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    from rtree import index
+    import shapely
 
-    boxes = np.arange(len(triangles)), triangles.min(axis=1), triangles.max(axis=1)
-    tree: Any = index.Index(boxes, properties=index.Property(dimension=2))
-    row, count = tree.intersection_v(places, places)
-    row, place = row.astype(np.int64), np.repeat(np.arange(len(places)), count.astype(np.int64))
-    corners = triangles[row]
-    side, away = np.roll(corners, -1, axis=1) - corners, places[place, None] - corners
-    areas = side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0]  # signed, of a side and the place
-    whole = areas.sum(axis=1)
-    is_inside = (np.sign(whole)[:, None] * areas).min(axis=1) >= -_EDGE * np.abs(whole)
-    is_inside &= whole != 0.0
-    return place[is_inside], row[is_inside]
+    tree, beside = shapely.STRtree(shapely.polygons(triangles)), _EDGE * float(np.abs(triangles).max())
+    place, row = tree.query(shapely.points(places), "dwithin", beside)
+    return place, row
 
 
 def _grid(surface: Any, along: str) -> Array:

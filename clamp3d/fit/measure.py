@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -66,7 +65,8 @@ def measure(surface: Surface, region: Region) -> dict[str, Any] | None:
     if ends := _ends(z, lengths, rounds, _straddling(region, facet, z1 - z0)):
         z0, z1, length_error = ends
     lips = [along & (k * t > 0.8) & (np.abs(v) < 0.85) for k in (-1, 1)]
-    facet = _facet(surface, axis, region.faces)
+    corner = angles(surface, axis, region.faces, *perpendicular(axis.direction))
+    facet = float(np.median(np.ptp(turned(corner, corner[:, :1]), axis=1)))
     if half < np.pi and (ends := _ends(angle, lengths, lips, _straddling(region, facet, 2.0 * half))):
         a, b, arc_error = ends
         half, middle = 0.5 * (b - a), middle + 0.5 * (a + b)
@@ -114,13 +114,6 @@ def _errors(
 def _straddling(region: Region, facet: float, extent: float) -> float:
     """Size of the triangles that may straddle a region's border: those of strips, and as long ones, end at it."""
     return 0.0 if region.strips or facet >= 0.5 * extent else facet
-
-
-def _facet(surface: Surface, axis: Axis, faces: IntArray) -> float:
-    """Median angle (rad) that a triangle covers."""
-    u = axis.radial(surface.V[surface.F[faces].reshape(-1)])[0].reshape(-1, 3, 3)
-    chord = np.linalg.norm(u - u[:, [1, 2, 0]], axis=2).max(axis=1)
-    return 2.0 * math.asin(min(0.5 * np.median(chord), 1.0))
 
 
 def _off_ridges(surface: Surface, region: Region) -> float:

@@ -52,22 +52,17 @@ class ContactModel(Protocol):
     @property
     def name(self) -> str:
         """What the user calls it: 'cas', 'chords', ..."""
-        ...
 
     @property
     def limits(self) -> tuple[str, ...]:
         """What the model cannot do, in words for the user: 'no depth', 'surface only', ..."""
-        ...
 
     @property
     def meshes_built(self) -> int:
         """How many parts had to be meshed so far."""
-        ...
 
     def pieces(self, pair: GroovePair, T_a_b: Array) -> Pieces:
         """Gaps of all pieces of ``pair`` with part b at ``T_a_b`` (4, 4) in part a's frame."""
-        ...
 
     def distances(self, pair: GroovePair, T_a_b: Array) -> Array:
         """Signed distances (n,) mm for poses (n, 4, 4)."""
-        ...

@@ -15,7 +15,6 @@ from clamp3d.kernel.flat_ends import with_flat_ends
 from clamp3d.kernel.jit import entry, formula, inlined
 from clamp3d.kernel.nearest import Answer, inside_rate, nearest
 from clamp3d.kernel.piece_gaps import END_BELOW, end_gap, free_gap, gap_inside, place_inside
-from clamp3d.kernel.pieces import PIECE_RECORD
 from clamp3d.kernel.vector import Vector, cross, dot, plus, put, times
 
 
@@ -103,7 +102,7 @@ def measure(
     return -1
 
 
-@entry(boolean(float64[:, ::1], *_SIZES, from_dtype(PIECE_RECORD)[::1]))
+@entry(boolean(float64[:, ::1], *_SIZES, from_dtype(RECORD)[::1]))
 def pieces(T: Array, R: float, half_angle: float, H: float, r: float, half: float, out: Any) -> bool:
     """The five pieces at one pose (4, 4) into records (5,); False for a pose that is not rigid."""
     if not rigid(T):

@@ -20,7 +20,7 @@ from clamp3d.kernel import features
 from clamp3d.kernel.edges import Edge, cylinder_distance, from_axis, on_arc, on_line
 from clamp3d.kernel.features import Groove, Rod
 from clamp3d.kernel.jit import formula, inlined
-from clamp3d.kernel.nearest import UNIT, Answer, inside, inside_rate, mixture, way_out
+from clamp3d.kernel.nearest import UNIT, Answer, inside, inside_rate, way_out
 from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus, times
 
 
@@ -286,7 +286,7 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
     if f <= 0.0:
         if not (abs(g - e) <= 64.0 * bound and is_mixed):
             u, v = (1.0, 0.0) if g >= e else (0.0, 1.0)
-        rate = mixture(u / (u + v), to_side, v / (u + v), to_end)
+        rate = plus(times(u / (u + v), to_side), v / (u + v), to_end)
         return to_side if g >= e else to_end, rate, t
     # Near contact the difference of nearly equal numbers has lost its digits.
     if f > 64.0 * bound or not (is_mixed and (on_face or (g > -bound and e > -bound))):
@@ -294,7 +294,7 @@ def witness(groove: Groove, rod: Rod, best: Search, bound: float) -> tuple[Vecto
         if f <= 64.0 * bound and (g <= -bound or e <= -bound):
             u, v = (1.0, 0.0) if g > e else (0.0, 1.0)
     n = math.sqrt(u * u + v * v)
-    normal = mixture(u / n, to_side, v / n, to_end) if n > 0.0 else to_side
+    normal = plus(times(u / n, to_side), v / n, to_end) if n > 0.0 else to_side
     return normal, normal, t
 
 

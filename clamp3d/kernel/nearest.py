@@ -8,7 +8,7 @@ from typing import NamedTuple
 from clamp3d.kernel import features
 from clamp3d.kernel.features import Candidate, Groove, Rod
 from clamp3d.kernel.jit import formula, inlined
-from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus
+from clamp3d.kernel.vector import Vector, dot, length, minus, over, plus, times
 
 UNIT = 2.0**-53
 """Unit roundoff of float64."""
@@ -87,12 +87,6 @@ def inside(groove: Groove, rod: Rod, lo: float, hi: float, bound: float) -> Answ
     return Answer(out.distance - rod.r, out.point, out.normal, out.feature, t, bound)
 
 
-@inlined
-def mixture(u: float, a: Vector, v: float, b: Vector) -> Vector:
-    """``u a + v b``."""
-    return Vector(u * a.x + v * b.x, u * a.y + v * b.y, u * a.z + v * b.z)
-
-
 @formula
 def inside_rate(groove: Groove, rod: Rod, t: float) -> Vector:
     """Rate of the depth's negative by a shift of an axis inside S whose deepest point is at t.
@@ -127,7 +121,7 @@ def inside_rate(groove: Groove, rod: Rod, t: float) -> Vector:
     if nearest_depth - depths[first] > 1e-9 * (groove.R + groove.H + depths[first]):
         return normal
     u = other_along / (other_along - along)
-    return mixture(u, normal, 1.0 - u, other)
+    return plus(times(u, normal), 1.0 - u, other)
 
 
 @formula

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clamp3d.geometry.pose import Array, check_pose
 from clamp3d.geometry.primitives import AnyCylinder, Capsule, Cylinder, SweptArc, check_shapes
-from clamp3d.kernel.distance import TWIST, VECTOR, as_pose, kernel
-
-PIECE_RECORD = np.dtype(
-    [
-        ("distance", np.float64),
-        ("point_on_groove", *VECTOR),
-        ("normal", *VECTOR),
-        ("feature", np.int8),
-        ("gradient", *TWIST),
-    ],
-    align=True,
-)
-"""What the kernel writes: the fields of `GroovePieces` in their order."""
+from clamp3d.kernel.distance import RECORD, as_pose, kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +81,8 @@ def groove_pieces(groove: SweptArc, cylinder: AnyCylinder, pose: ArrayLike) -> G
     if type(groove) is not SweptArc or type(cylinder) not in (Capsule, Cylinder):
         check_shapes(groove, cylinder)
     T = as_pose(pose)
-    out = np.empty(5, PIECE_RECORD)
+    out = np.empty(5, RECORD)
     half, along = 0.5 * groove.length, 0.5 * cylinder.length
     if not kernel().pieces(T, groove.radius, groove.half_angle, half, cylinder.radius, along, out):
         return groove_pieces(groove, cylinder, check_pose(T))
-    return GroovePieces(**{name: out[name] for name in PIECE_RECORD.names or ()})
+    return GroovePieces(**{field.name: out[field.name] for field in fields(GroovePieces)})

@@ -13,8 +13,8 @@ import numpy as np
 
 from clamp3d.errors import Clamp3dError, InputError
 from clamp3d.files.bodies import Component, printable
-from clamp3d.files.open_cascade import explore, location, occ, parse
-from clamp3d.files.solid import BrepSolid, require_open_cascade
+from clamp3d.files.open_cascade import explore, location, occ, parse, require_open_cascade
+from clamp3d.files.solid import BrepSolid
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import Array, inverse
 from clamp3d.geometry.profile import Arc

@@ -11,7 +11,6 @@ from scipy.spatial import ConvexHull
 
 from clamp3d import Cylinder, assemble, load_clamp
 from clamp3d.baselines import METHODS, Cas, Chords, Hulls, Meshes, Wedges, contact_model
-from clamp3d.baselines.decomposition import DecompositionParameters
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.wedges import part_wedges, prism
 from clamp3d.bench.compare.scene import block_pair, grooved_block
@@ -101,7 +100,7 @@ def intrusion(decomposition, pair):
 
 def test_hulls_fill_the_groove_and_no_more_than_their_intrusion(tmp_path, monkeypatch):
     monkeypatch.setenv("CLAMP3D_CACHE", str(tmp_path))
-    settings = DecompositionParameters(threshold=0.05, real_metric=False)
+    settings = 0.05 * 137.0 / 1.6
     model = Hulls({"P1": BLOCK}, settings, mesh_error=0.5)
     poses = _poses(100, 0.0, seed=2)
     exact = Cas().distances(PAIR, poses)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clamp3d.baselines.decomposition import DecompositionParameters, cache_dir, decompose
+from clamp3d.baselines.decomposition import cache_dir, decompose
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.errors import SolverError
 from clamp3d.shapes import SweptArc, mesh
 from tests.refusals import refusals
 
 BLOCK = grooved_block(SweptArc(12.0, math.radians(70.0), 60.0), width=137.0, depth=30.0)
-COARSE = DecompositionParameters(threshold=0.05, real_metric=False)
+COARSE = 0.05 * 137.0 / 1.6
 
 
 def _meshed(chords):
@@ -43,7 +43,7 @@ def test_hulls_are_cached_by_content():
     assert _same(first, second)
     # Another vertex or parameter is other content.
     assert not decompose(V + np.array([1e-9, 0.0, 0.0]), F, COARSE).cached
-    assert not decompose(V, F, DecompositionParameters(threshold=0.05, real_metric=False, seed=1)).cached
+    assert not decompose(V, F, COARSE + 0.01).cached
     for kept in cache_dir().iterdir():  # a damaged file is no answer
         kept.write_bytes(kept.read_bytes()[:-200])
     again = decompose(V, F, COARSE)
@@ -60,7 +60,7 @@ def test_hulls_are_cached_by_content():
 
 def test_a_time_limit_ends_the_process():
     with pytest.raises(SolverError, match=r"did not finish P1 in 0.5 s at threshold 0\.05; raise time_limit or thresh"):
-        decompose(*_meshed(28), DecompositionParameters(threshold=0.05), name="P1", time_limit=0.5)
+        decompose(*_meshed(28), 0.05, name="P1", time_limit=0.5)
     assert not cache_dir().exists()
 
 
@@ -74,7 +74,6 @@ def test_a_process_that_fails_is_said(monkeypatch):
 test_bad_meshes_and_parameters_are_refused = refusals(
     (lambda: decompose(np.full_like(V, np.nan), F, COARSE), "finite"),
     (lambda: decompose(V, F[1:], COARSE), "watertight"),
-    (lambda: DecompositionParameters(threshold=0.0), "threshold must be > 0, got 0"),
-    (lambda: DecompositionParameters(threshold=math.nan), "threshold must be > 0"),
-    (lambda: DecompositionParameters(threshold=2.0, real_metric=False), "threshold must be <= 1 without real_metric"),
+    (lambda: decompose(V, F, 0.0), "threshold must be > 0, got 0"),
+    (lambda: decompose(V, F, math.nan), "threshold must be > 0"),
 )

@@ -8,8 +8,8 @@ import numpy as np
 from igl import winding_number
 
 from clamp3d.files.cad import Key, matrix
-from clamp3d.files.open_cascade import explore, occ
-from clamp3d.files.solid import BrepSolid, require_open_cascade
+from clamp3d.files.open_cascade import explore, occ, require_open_cascade
+from clamp3d.files.solid import BrepSolid
 from tests.cad import Tree, ball, bounds, cone, cut, location, moved, ring, rod, shift, volume
 from tests.cad import block as box
 from tests.cad import first_solid as solid_of

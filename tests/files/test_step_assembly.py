@@ -11,7 +11,7 @@ pytest.importorskip("OCP")
 
 from clamp3d import InputError, load
 from clamp3d.files.formats import load_bodies
-from clamp3d.files.open_cascade import explore, occ, volume_of
+from clamp3d.files.open_cascade import explore, from_bytes, occ, volume_of
 from clamp3d.files.part21 import announced
 from clamp3d.geometry.shells import volume
 from tests.cad import Tree, location, random_pose
@@ -93,7 +93,7 @@ def test_a_line_less_is_never_a_body_less(tmp_path):
         damaged = tmp_path / f"{k}.step"
         damaged.write_text("".join(lines[:k] + lines[k + 1 :]))
         try:
-            sizes = sorted(volume_of(body.shape.solid) for body in load_bodies(damaged).bodies)
+            sizes = sorted(volume_of(from_bytes(body.shape.brep)) for body in load_bodies(damaged).bodies)
         except InputError:
             refused += 1
             continue
@@ -196,7 +196,8 @@ def test_parts_in_files_of_their_own_are_read(in_files):
     assert {file.name for file in path.parent.iterdir()} == {"machine.step", "of_plate.stp", "of_pin: 5 x 10.stp"}
     scene = load(path)
     assert [part.name for part in scene.parts] == [name for name, _, _ in truth]
-    assert [volume_of(part.shape.solid) for part in scene.parts] == pytest.approx([size for _, size, _ in truth])
+    volumes = [volume_of(from_bytes(part.shape.brep)) for part in scene.parts]
+    assert volumes == pytest.approx([size for _, size, _ in truth])
 
 
 def test_parts_in_files_that_are_lost_damaged_or_elsewhere_are_refused(in_files, tmp_path_factory):
