@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
-from clamp3d.files.open_cascade import explore, faces_of, matrix, occ, parse, require_open_cascade
+from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, form_of, height, points_on, surfaces
+from clamp3d.files.open_cascade import area_of, explore, faces_of, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import IntArray, appended, is_closed
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
@@ -42,6 +42,8 @@ _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
 """About how many places of a spline are looked at besides those of each triangle."""
+_NO_AREA = 1e-9
+"""Area (mm^2) up to which a face may have no triangles: even a ball of so little is smaller than a contact."""
 _DIGITS = 9
 """Decimals (mm) to which points are one vertex."""
 _EDGE = 1e-9
@@ -78,9 +80,8 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     """
     # A copy: of a solid with triangles Open CASCADE measures distances by their boxes, and leaves out what of a round
     # flat face is beyond them.
-    solid, form = parse(brep), surfaces(brep)
-    faces = [*explore(solid, "FACE")]
-    meshes, overlooked = _meshes(solid, faces, form, chord, near)
+    form = surfaces(brep)
+    faces, meshes, overlooked = _meshed(parse(brep), form, chord, near)
     corners, triples, numbers, errors = [], [], [], []
     for k, (face, (points, triangles, uv)) in enumerate(zip(faces, meshes, strict=True)):
         if not len(triangles):
@@ -102,6 +103,28 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
 
+def _meshed(
+    solid: Any, form: Surfaces, chord: float, near: tuple[int, ...] | None
+) -> tuple[list[Any], list[tuple[Array, IntArray, Array]], list[Array]]:
+    """The faces of a solid, with what `_meshes` says of them.
+
+    Of some cones with an edge all round Open CASCADE makes no triangles (its issue 572), but of these as turned lines,
+    which have the same parameters.
+    """
+    faces = [*explore(solid, "FACE")]
+    try:
+        return faces, *_meshes(solid, faces, form, chord, near)
+    except Clamp3dError:
+        bare = [face for face in faces if occ.BRep_Tool.Triangulation_s(face, occ.TopLoc_Location()) is None]
+        cones = [face for face in bare if form_of(occ.BRepAdaptor_Surface(face))[0] == CONE]
+        if not cones:
+            raise
+    turned = occ.BRepTools_ReShape()
+    for face in cones:
+        turned.Replace(face, occ.ShapeCustom.ConvertToRevolution_s(face))
+    return _meshed(turned.Apply(solid), form, chord, near)
+
+
 def _meshes(
     solid: Any, faces: list[Any], form: Surfaces, chord: float, near: tuple[int, ...] | None
 ) -> tuple[list[tuple[Array, IntArray, Array]], list[Array]]:
@@ -116,7 +139,7 @@ def _meshes(
         for shape, numbers, most in steps:
             if numbers:
                 _mesh(shape, {k: faces[k] for k in numbers}, form, most / finer)
-        meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
+        meshes = [_triangles(face, k) for k, face in enumerate(faces)]
         overlooked = [_overlooked(face, kind, *mesh) for face, kind, mesh in zip(faces, form.kind, meshes, strict=True)]
         is_seen = all(overlooked[k].max(initial=0.0) <= most for _, numbers, most in steps for k in numbers)
         if is_seen or sum(len(triangles) for _, triangles, _ in meshes) > _MANY:
@@ -138,7 +161,7 @@ def _mesh(shape: Any, faces: dict[int, Any], form: Surfaces, chord: float) -> No
     occ.BRepMesh_IncrementalMesh(shape, how)
     if not straight:
         return
-    near = {k for k in straight if _deviation(faces[k], form, k, *triangles_of(faces[k], k)).max(initial=0.0) <= chord}
+    near = {k for k in straight if _deviation(faces[k], form, k, *_triangles(faces[k], k)).max(initial=0.0) <= chord}
     for k, face in faces.items():
         if k not in near and (form.kind[k] == OTHER or _is_spline(face)):
             occ.BRepTools.Clean_s(face)
@@ -166,6 +189,16 @@ def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
     return points, triangles.reshape(-1, 3), uv
 
 
+def _triangles(face: Any, number: int) -> tuple[Array, IntArray, Array]:
+    """The same; none of a face without an area, between two edges in one place, of which Open CASCADE makes none."""
+    try:
+        return triangles_of(face, number)
+    except Clamp3dError:
+        if area_of(face) > _NO_AREA:
+            raise
+    return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), np.empty((0, 2))
+
+
 def sag_factors(kind: int, frame: Array, triangles: Array) -> Array:
     """How much farther (m,) triangles (m, 3, 3) can be from their surface than at the middles of their edges.
 
@@ -187,6 +220,8 @@ def _deviation(face: Any, form: Surfaces, k: int, points: Array, triangles: IntA
     Splines are looked at in more places, on the edges and between.
     """
     kind = int(form.kind[k])
+    if not len(triangles):
+        return np.zeros(0)
     if kind == OTHER:
         at = _PLACES @ uv[triangles]
         places, row = distinct_points_on(face, at.reshape(-1, 2))

@@ -10,6 +10,7 @@ pytest.importorskip("OCP", reason="Open CASCADE (extra step) is not installed")
 
 
 from clamp3d import Verdict, check, load
+from clamp3d.errors import Clamp3dError
 from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
@@ -323,3 +324,65 @@ def test_faces_with_places_of_their_own_make_a_closed_mesh():
     for _ in range(8):
         hexagon = moved(placed_pair("hexagon_in_bore", rng, 0.03, splines=0.0).b, random_pose(rng))
         assert is_closed(BrepSolid.of(first_solid(hexagon), "hexagon").tessellated(0.1).faces)
+
+
+def without_triangles(monkeypatch, kind):
+    """Has Open CASCADE make no triangles of faces of a kind, as it makes none of some."""
+    mesh = occ.BRepMesh_IncrementalMesh
+
+    def meshed(shape, how):
+        mesh(shape, how)
+        for face in explore(shape, "FACE"):
+            if occ.BRepAdaptor_Surface(face).GetType() == kind:
+                occ.BRepTools.Clean_s(face)
+
+    monkeypatch.setattr(occ, "BRepMesh_IncrementalMesh", meshed, raising=False)
+
+
+@pytest.mark.parametrize("near", [None, (1,)])
+def test_cones_of_which_open_cascade_makes_no_triangles_are_meshed_as_turned_lines(near, monkeypatch):
+    """It makes none of some chamfers of holes, as they come from other CAD; what they have in common is not known."""
+    plate = cut(block((-9, -9, 0), (9, 9, 4)), rod(3, -1, 5), cone(4, 3, -0.5, 0.5))
+    brep = to_bytes(first_solid(plate))
+    usual = tessellate(brep, 0.01)
+    without_triangles(monkeypatch, occ.GeomAbs_SurfaceType.GeomAbs_Cone)
+    made = tessellate(brep, 0.01, near)
+    assert is_closed(made.faces)
+    (number,) = np.flatnonzero(faces.surfaces(brep).kind == CONE)
+    on_cone = made.face == number
+    assert set(made.face.tolist()) == set(usual.face.tolist())
+    corners = made.vertices[made.faces]
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    middles = corners.mean(axis=1)
+    assert (np.einsum("ij,ij->i", turned[on_cone, :2], middles[on_cone, :2]) < 0.0).all()  # out of the plate
+    cone_face = [*explore(from_bytes(brep), "FACE")][number]
+    assert (off_face(cone_face, middles[on_cone]) <= made.errors[on_cone]).all()
+    assert made.errors.max() < 0.02 or near
+
+
+def test_other_faces_without_triangles_are_said(monkeypatch):
+    without_triangles(monkeypatch, occ.GeomAbs_SurfaceType.GeomAbs_Plane)
+    with pytest.raises(Clamp3dError, match="no triangles of face 1"):
+        tessellate(to_bytes(first_solid(block((0, 0, 0), (1, 2, 3)))), 0.1)
+
+
+def test_a_face_without_an_area_needs_no_triangles():
+    """A block of which two faces meet in an edge each, with a plane face of no width between these."""
+    builder, shell, wire = occ.BRep_Builder(), occ.TopoDS_Shell(), occ.TopoDS_Wire()
+    first, *rest = explore(first_solid(block((0, 0, 0), (4, 5, 6))), "FACE")
+    edge = next(explore(first, "EDGE"))
+    other = edge.EmptyCopied()  # with the same curves
+    for end in explore(edge, "VERTEX"):
+        builder.Add(other, end)
+    mend = occ.BRepTools_ReShape()
+    mend.Replace(edge, other)
+    builder.MakeShell(shell)
+    builder.MakeWire(wire)
+    for side in (edge.Reversed(), other):
+        builder.Add(wire, side)
+    sliver = occ.BRepBuilderAPI_MakeFace(occ.BRepAdaptor_Surface(first).Plane(), wire).Face()
+    for face in (mend.Apply(first), sliver, *rest):
+        builder.Add(shell, face)
+    made = tessellate(to_bytes(occ.BRepBuilderAPI_MakeSolid(shell).Solid()), 0.1)
+    assert is_closed(made.faces)
+    assert set(made.face.tolist()) == {0, 2, 3, 4, 5, 6}
