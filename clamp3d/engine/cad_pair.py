@@ -12,7 +12,7 @@ from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.exact import SHARES, exact_distance, exact_overlap, exact_probe
 from clamp3d.engine.mesh_distance import CUTS, FEW_CUTS, meshes_distance, surface_distance
-from clamp3d.engine.model import CAD_CHORDS, MOST_FINE, QUICK_TRIANGLES, Model
+from clamp3d.engine.model import CAD_CHORDS, MOST_FINE, QUICK_TRIANGLES, CadModel
 from clamp3d.engine.near_faces import faces_nearby
 from clamp3d.engine.slab import slab_distance
 from clamp3d.errors import Clamp3dError
@@ -36,7 +36,7 @@ class CadPair:
     ``enough`` says whether bounds decide what is to be known: then a level sharpens them no further.
     """
 
-    def __init__(self, a: Model, b: Model, T: Array, enough: Enough) -> None:
+    def __init__(self, a: CadModel, b: CadModel, T: Array, enough: Enough) -> None:
         self.a, self.b, self.T, self.enough = a, b, T, enough
         self._has_meshes = bool(a.chords and b.chords)
         self._has_asked_fine_meshes = False
@@ -85,8 +85,6 @@ class CadPair:
     @cached_property
     def _nearby(self) -> tuple[IntArray, IntArray]:
         """The faces of both solids that are near the other one."""
-        assert self.a.face_meshes is not None
-        assert self.b.face_meshes is not None
         return faces_nearby(self.a.face_meshes, self.b.face_meshes, self.T)
 
     @cached_property
@@ -144,7 +142,6 @@ class CadPair:
         return replace(distance, method=f"meshes (FCL), chord error {CAD_CHORDS[-1]:.2g} mm")
 
 
-def _may_be_ball(model: Model) -> bool:
+def _may_be_ball(model: CadModel) -> bool:
     """Whether all faces of a solid are spherical, so that Open CASCADE's distance may be signed."""
-    assert model.exact is not None
-    return bool((model.exact.surfaces.kind == SPHERE).all())
+    return bool((model.shape.surfaces.kind == SPHERE).all())

@@ -14,7 +14,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.mesh_distance import surface_distance
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import CadModel
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
 from clamp3d.files import cad_process
@@ -28,7 +28,7 @@ _HALF = 5.0
 """Half of the length (mm) of the prisms that stand for sections: depths up to this are those of the sections."""
 
 
-def coaxial_distance(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
+def coaxial_distance(a: CadModel, b: CadModel, T: Array, enough: Enough) -> Distance | None:
     """Signed distance of ``b`` at ``T`` (4, 4) in a's frame; None of solids that are not turned about one axis."""
     if (distance := _about_axis(a, b, T, enough)) is not None:
         return distance
@@ -36,11 +36,9 @@ def coaxial_distance(a: Model, b: Model, T: Array, enough: Enough) -> Distance |
     return None if other_way is None else other_way.moved(T).swapped()
 
 
-def _about_axis(turned: Model, other: Model, T: Array, enough: Enough) -> Distance | None:
+def _about_axis(turned: CadModel, other: CadModel, T: Array, enough: Enough) -> Distance | None:
     """The same where one solid is wholly turned, ``other`` being at ``T`` (4, 4) in its frame; None where it is not."""
-    assert turned.exact is not None
-    assert other.exact is not None
-    form, others = turned.exact.surfaces, other.exact.surfaces
+    form, others = turned.shape.surfaces, other.shape.surfaces
     axis = axis_of(form)
     if axis is None or not turned_about(form, axis).all():
         return None
@@ -51,11 +49,11 @@ def _about_axis(turned: Model, other: Model, T: Array, enough: Enough) -> Distan
     if own_axis is None:  # of planes alone
         own_axis = there
     try:
-        own = cad_process.turned_sections(turned.exact.brep, axis.tobytes(), 0.0)
+        own = cad_process.turned_sections(turned.shape.brep, axis.tobytes(), 0.0)
         if not own or own[-1].reach < np.inf:
             return None
         # About the axis as its file has it: by one that is off in the last digits Open CASCADE finds no circles.
-        around = cad_process.turned_sections(other.exact.brep, own_axis.tobytes(), own[-1].radius)
+        around = cad_process.turned_sections(other.shape.brep, own_axis.tobytes(), own[-1].radius)
     except Clamp3dError:
         return None
     if not around:

@@ -17,11 +17,11 @@ from clamp3d.engine.coaxial import coaxial_distance
 from clamp3d.engine.convex import Convex
 from clamp3d.engine.convex_depth import convex_depth
 from clamp3d.engine.exact import SHARES, attested_overlap, depths_in, exact_distance, exact_overlap, exact_probe
-from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, greatest_overlap, rounding_of
-from clamp3d.engine.model import QUICK_TRIANGLES, Model
+from clamp3d.engine.mesh_distance import FEW_CUTS, are_apart, greatest_overlap
+from clamp3d.engine.model import QUICK_TRIANGLES, CadModel, Model
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.refine import from_boxes, refine
-from clamp3d.engine.surface import Surface
+from clamp3d.engine.surface import Surface, rounding_of
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.pose import Array, to_target
@@ -65,7 +65,7 @@ _CLOSE = 1.05
 def _convex_pieces(*models: Model) -> list[Convex] | None:
     """The one exact convex piece that each body is made of; None if one is made of more, has holes, or is not exact."""
     # The facets of a solid from CAD tell that it is not convex, without what a closed form costs.
-    if any(m.exact is not None and not (m.chords and m.outer(m.chords[0]).is_convex) for m in models):
+    if any(isinstance(m, CadModel) and not (m.chords and m.outer(m.chords[0]).is_convex) for m in models):
         return None
     bodies = [m.bodies[0] for m in models if m.bodies and len(m.bodies) == 1]
     exact = all(not (body.bores or body.surface or len(body.outers) > 1) and body.error <= _EXACT for body in bodies)
@@ -77,7 +77,9 @@ def depth_of_pieces(a: Model, b: Model, T: Array) -> Distance | None:
     pieces = _convex_pieces(a, b)
     if pieces is None:
         return None
-    distance = convex_depth(pieces[0], np.eye(4), pieces[1], T).widened(2.0 * _EXACT if a.exact or b.exact else 0.0)
+    distance = convex_depth(pieces[0], np.eye(4), pieces[1], T).widened(
+        2.0 * _EXACT if isinstance(a, CadModel) or isinstance(b, CadModel) else 0.0
+    )
     return replace(distance, level="features") if distance.upper <= 0.0 else None
 
 
@@ -164,7 +166,7 @@ def _overlapping_meshes(a: Model, b: Model, T: Array, thorough: bool) -> Iterato
 
 def _chords(a: Model, b: Model, thorough: bool) -> Iterator[tuple[float, float]]:
     """Chord errors (mm) of the meshes of two bodies, from coarse to fine."""
-    both_exact = a.exact is not None and b.exact is not None
+    both_exact = isinstance(a, CadModel) and isinstance(b, CadModel)
     if both_exact:
         yield a.chords[0], b.chords[0]
     yield a.fine_chord, b.fine_chord
@@ -177,7 +179,7 @@ def _way_out(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, thoro
     depth = max(depth, _reached(a, b, meshes))
     length, direction = _way_by_meshes(meshes, depth)
     way = Distance(-length, -depth, normal=direction, method="meshes (FCL)")
-    is_costly = a.exact is not None and b.exact is not None and not thorough
+    is_costly = isinstance(a, CadModel) and isinstance(b, CadModel) and not thorough
     for _ in range(_EXACT_ADVANCES if is_costly else _ADVANCES):
         if _is_long(way, meshes) or -way.lower <= _TIGHT * -way.upper:
             break
@@ -214,7 +216,7 @@ def _shortened(a: Model, b: Model, T: Array, way: Array, most: float) -> Distanc
     moved = T.copy()
     moved[:3, 3] += way
     length = float(np.linalg.norm(way))
-    if a.exact is not None and b.exact is not None:
+    if isinstance(a, CadModel) and isinstance(b, CadModel):
         if a.is_free_form or b.is_free_form:  # of which Open CASCADE may say too large a gap
             return Distance()
         try:
@@ -242,7 +244,7 @@ def _interference(a: Model, b: Model, meshes: _OverlappingMeshes, depth: float, 
     ``depth`` (mm): that of a point.
     """
     own = Distance()
-    if a.exact is not None and b.exact is not None:
+    if isinstance(a, CadModel) and isinstance(b, CadModel):
 
         def end(bounds: Distance, closest: Distance) -> bool:
             return bounds.lower >= (_SHARPER if thorough else _SHARP) * closest.lower

@@ -12,7 +12,7 @@ import numpy as np
 
 from clamp3d.engine.answer import Distance
 from clamp3d.engine.farthest import Pieces, farthest
-from clamp3d.engine.model import CAD_CHORDS, Model
+from clamp3d.engine.model import CAD_CHORDS, CadModel, Model
 from clamp3d.engine.near_faces import faces_nearby, near_faces
 from clamp3d.engine.overlap import common
 from clamp3d.engine.surface import Surface
@@ -42,22 +42,22 @@ _NARROW, _HIDING = 9e-3, 0.01
 """Overlap (mm) allowed for where Open CASCADE finds none, and chord error of meshes whose points would show it."""
 
 
-def exact_distance(a: Model, b: Model, T: Array, most: float = np.inf) -> Distance:
+def exact_distance(a: CadModel, b: CadModel, T: Array, most: float = np.inf) -> Distance:
     """Distance of ``b`` at ``T`` (4, 4) in a's frame; nothing from below where they touch or it is not the least.
 
     Raises Clamp3dError where there are more than ``most`` pairs of edges to look at.
     """
-    assert a.exact is not None
-    assert b.exact is not None
-    near = near_faces(a.face_meshes, b.face_meshes, T)
-    nearest = cad_process.distance(a.exact.brep, b.exact.brep, T, near, most)
+    near = near_faces(a.face_meshes, b.face_meshes, T) if a.chords and b.chords else None
+    nearest = cad_process.distance(a.shape.brep, b.shape.brep, T, near, most)
     gap, way = nearest.distance, nearest.q - nearest.p
     lower = gap - TOLERANCE if nearest.is_least and (gap > TOLERANCE or nearest.is_signed) else -np.inf
     normal = way / np.linalg.norm(way) if lower > 0.0 else None
     return Distance(lower, gap + TOLERANCE, nearest.p, nearest.q, normal, method=METHOD)
 
 
-def exact_probe(a: Model, b: Model, T: Array, *, chord: float | None = None, points_each: int = _PROBED) -> Distance:
+def exact_probe(
+    a: CadModel, b: CadModel, T: Array, *, chord: float | None = None, points_each: int = _PROBED
+) -> Distance:
     """How deep some points of the common part of meshes lie in two solids that touch or overlap.
 
     The corners of a mesh lie on the solid itself, so some of an overlap are as deep as it is, however coarse the mesh.
@@ -72,8 +72,6 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float | None = None, poi
     if chord is None:
         meshes = [model.outer(CAD_CHORDS[0]) for model in (a, b)]
     else:
-        assert a.face_meshes is not None
-        assert b.face_meshes is not None
         on_a, on_b = faces_nearby(a.face_meshes, b.face_meshes, T)
         meshes = [a.outer_near(on_a, chord), b.outer_near(on_b, chord)]
     shared = common(meshes[0], meshes[1], T)
@@ -86,12 +84,10 @@ def exact_probe(a: Model, b: Model, T: Array, *, chord: float | None = None, poi
     return attested_overlap(points, depths_in(a, b, T, points))
 
 
-def _corners_in_both_boxes(a: Model, b: Model, T: Array, chord: float) -> Array:
+def _corners_in_both_boxes(a: CadModel, b: CadModel, T: Array, chord: float) -> Array:
     """Some corners (k, 3) of triangles of two solids, which need not close, that lie in the box of the other one."""
-    assert a.exact is not None
-    assert b.exact is not None
     try:
-        on_a, on_b = (solid.tessellated(chord).vertices for solid in (a.exact, b.exact))
+        on_a, on_b = (solid.tessellated(chord).vertices for solid in (a.shape, b.shape))
     except Clamp3dError:  # a face gets none
         return np.empty((0, 3))
     corners = np.vstack([on_a, to_target(T, on_b)])
@@ -131,8 +127,8 @@ def exact_height(inner: Surface, outer: Surface, solid: Model, T: Array) -> floa
 
 
 def exact_overlap(
-    a: Model,
-    b: Model,
+    a: CadModel,
+    b: CadModel,
     T: Array,
     share: float,
     *,
@@ -147,11 +143,9 @@ def exact_overlap(
     ``quick``: nothing is known if it takes more than a second to find.
     ``attested``: how deep (mm) a point lies: then some of a common part that is not as deep is missing.
     """
-    assert a.exact is not None
-    assert b.exact is not None
     try:
         find = cad_process.quick_common if quick else cad_process.common
-        shared = find(a.exact.brep, b.exact.brep, T, share)
+        shared = find(a.shape.brep, b.shape.brep, T, share)
     except Clamp3dError:  # it takes too long, or fails
         return _UNKNOWN
     if shared.volume <= TOLERANCE * max(1e-12, shared.area):
@@ -181,7 +175,7 @@ def exact_overlap(
     return bounded(at_most)
 
 
-def _without_common_part(a: Model, b: Model, T: Array, attested: float) -> Distance:
+def _without_common_part(a: CadModel, b: CadModel, T: Array, attested: float) -> Distance:
     """What is known where Open CASCADE finds no common part: from below nothing, if a point lies in one.
 
     It misses those between round faces that are nearly tangent: of a ball and a ring one of 0.014 mm was seen. No proof

@@ -11,7 +11,7 @@ from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.depth import depth_of_pieces
 from clamp3d.engine.exact import exact_height
 from clamp3d.engine.mesh_distance import is_deep_inside, within
-from clamp3d.engine.model import Model, box_corners
+from clamp3d.engine.model import CadModel, Model, box_corners
 from clamp3d.engine.refine import refine
 from clamp3d.engine.verdict import RESOLUTION, Thresholds, Verdict
 from clamp3d.errors import Clamp3dError
@@ -72,7 +72,7 @@ def _holds(inner: Model, outer: Model, T: Array, contact: float) -> bool:
     if not may_hold(inner, outer, T, contact):
         return False
     inner.counters.queries["containment"] += 1
-    both_exact = inner.exact is not None and outer.exact is not None
+    both_exact = isinstance(inner, CadModel) and isinstance(outer, CadModel)
     for level in (0, -1) if inner.refines or outer.refines else (0,):  # coarse meshes mostly tell that it does not
         try:
             small, large = inner.outer(inner.chords[level]), outer.inner(outer.chords[level])

@@ -16,7 +16,7 @@ from clamp3d.engine.answer import Distance, Enough
 from clamp3d.engine.farthest import End
 from clamp3d.engine.model import Model
 from clamp3d.engine.overlap import Common, common, deepest, thickness
-from clamp3d.engine.surface import TURN, Surface, fcl_pair, tree_distance
+from clamp3d.engine.surface import TURN, Surface, fcl_pair, rounding_of, tree_distance
 from clamp3d.geometry.manifolds import arrays_of
 from clamp3d.geometry.pose import Array, inverse, to_source, to_target
 
@@ -148,11 +148,6 @@ def one_in_other(a: Surface, b: Surface, T: Array) -> bool:
 def one_inside(outer: Surface, inner: Surface, T: Array) -> bool:
     """Whether a shell of ``inner``, at ``T`` (4, 4) in outer's frame, lies in ``outer``; no surfaces may meet."""
     return bool(outer.contains(to_target(T, inner.shell_points)).any())
-
-
-def rounding_of(a: Surface, b: Surface, T: Array) -> float:
-    """What the distance of two meshes may be off by, mm: manifold3d merges vertices within 1e-12 of the size."""
-    return 4e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
 
 
 def surfaces_meet(a: Surface, b: Surface, T: Array) -> bool:

@@ -80,8 +80,6 @@ class Model:
     """All that can be known of one shape; ``counters`` counts what is built."""
 
     shape: Shape
-    exact: BrepSolid | None = None
-    """The solid from CAD that Open CASCADE can be asked about; None for other shapes."""
 
     def __init__(self, shape: Shape, counters: Counters) -> None:
         self.shape = shape
@@ -112,16 +110,6 @@ class Model:
         """Whether the part lies between an inner and an outer mesh; else one mesh has an error for each triangle."""
         return False
 
-    @cached_property
-    def face_meshes(self) -> FaceMeshes | None:
-        """The coarse triangles of a solid from CAD by its faces; None of other shapes, and where they do not close."""
-        return None
-
-    @property
-    def is_free_form(self) -> bool:
-        """Whether a solid from CAD has splines among its faces, of which Open CASCADE may say too large a gap."""
-        return False
-
     @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of a box that holds the true part, mm."""
@@ -143,19 +131,6 @@ class Model:
     @cached_property
     def bodies(self) -> Forms | None:
         """The shape in closed form; None if it has none."""
-        raise NotImplementedError
-
-    @property
-    def fine_triangles(self) -> float:
-        """About how many triangles a fine mesh of a solid from CAD has."""
-        raise NotImplementedError
-
-    def fine_triangles_near(self, faces: IntArray) -> float:
-        """The same of a mesh that is fine on some of its faces, numbered (k,)."""
-        raise NotImplementedError
-
-    def outer_near(self, faces: IntArray, chord: float) -> Surface:
-        """Mesh of a solid from CAD of chord error ``chord`` mm on some of its faces (k,), and coarse elsewhere."""
         raise NotImplementedError
 
     def _surface(self, chord: float, inside: bool) -> Surface | None:
@@ -218,8 +193,6 @@ class Model:
     @cached_property
     def quick_bodies(self) -> Forms | None:
         """The closed form where it is quicker to ask than the mesh; else None."""
-        if self.is_free_form and self._is_large:  # it is no bar, so its closed form is not worth making
-            return None
         if self.bodies is None or all(form.surface is None for form in self.bodies):
             return self.bodies
         return None if self._is_large else self.bodies
@@ -273,7 +246,6 @@ class CadModel(Model):
 
     def __init__(self, shape: BrepSolid, counters: Counters) -> None:
         super().__init__(shape, counters)
-        self.exact = shape
         # Poses along a motion mostly have the same faces near: more of these meshes would fill the memory.
         self._last_near: dict[float, tuple[tuple[int, ...], Surface]] = {}
 
@@ -357,15 +329,18 @@ class CadModel(Model):
         return bodies_of_fit(fit_solid(self.shape), mesh, chord=tessellation.errors, flat=flat)
 
     @cached_property
+    def quick_bodies(self) -> Forms | None:
+        """The closed form where it is quicker to ask than the mesh: large free-form solids are no bars."""
+        return None if self.is_free_form and self._is_large else super().quick_bodies
+
+    @cached_property
     def is_free_form(self) -> bool:
         """Whether it has splines among its faces that are no plain surfaces."""
         return bool((self.shape.surfaces.kind == OTHER).any())
 
     @cached_property
-    def face_meshes(self) -> FaceMeshes | None:
-        """The coarse triangles by their faces; None where they do not close."""
-        if not self.chords:
-            return None
+    def face_meshes(self) -> FaceMeshes:
+        """The coarse triangles by their faces."""
         return FaceMeshes(self.outer(CAD_CHORDS[0]), self.shape.tessellated(CAD_CHORDS[0]).face)
 
     def depth(self, points: Array) -> Array:

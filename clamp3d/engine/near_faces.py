@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clamp3d.engine.surface import Surface, fcl_tree, tree_distance
+from clamp3d.engine.surface import Surface, fcl_tree, rounding_of, tree_distance
 from clamp3d.geometry.pose import Array, inverse, to_target
 
 _FEW = 300
@@ -63,12 +63,12 @@ class FaceMeshes:
         return np.array([k for k in rows if tree_distance(self.tree(k), tree, T) <= limit], dtype=np.int64)
 
 
-def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Faces, Faces] | None:
+def near_faces(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces] | None:
     """The faces of two solids that can hold nearest points of their surfaces, ``b`` at ``T`` (4, 4) in a's frame.
 
-    None where triangles are missing, where there are few faces in all, and where one solid may be inside the other.
+    None where there are few faces in all, and where one solid may be inside the other.
     """
-    if a is None or b is None or len(a.numbers) * len(b.numbers) <= _FEW:
+    if len(a.numbers) * len(b.numbers) <= _FEW:
         return None
     corners_b, corners_a = to_target(T, b.surface.vertices), to_target(inverse(T), a.surface.vertices)
     if not (a.surface.is_any_outside(corners_b) and b.surface.is_any_outside(corners_a)):
@@ -78,7 +78,7 @@ def near_faces(a: FaceMeshes | None, b: FaceMeshes | None, T: Array) -> tuple[Fa
 
 def faces_nearby(a: FaceMeshes, b: FaceMeshes, T: Array) -> tuple[Faces, Faces]:
     """The faces of two solids that are no further from the other one than nearest points or an overlap can be."""
-    off = a.surface.error + b.surface.error
+    off = a.surface.error + b.surface.error + rounding_of(a.surface, b.surface, T)
     # The solids are no further apart than their triangles and this, nor a face nearer than its triangles less this.
     limit = max(tree_distance(a.surface.bvh, b.surface.bvh, T), 0.0) + 2.0 * off
     return a.near(b, T, limit), b.near(a, inverse(T), limit)

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from clamp3d.engine.answer import Distance
-from clamp3d.engine.mesh_distance import nearest_points, one_in_other, one_inside, rounding_of, surfaces_meet
+from clamp3d.engine.mesh_distance import nearest_points, one_in_other, one_inside, surfaces_meet
 from clamp3d.engine.model import Model
-from clamp3d.engine.surface import Surface, fcl_pair
+from clamp3d.engine.surface import Surface, fcl_pair, rounding_of
 from clamp3d.geometry.pose import Array, inverse, to_target
 from clamp3d.geometry.triangles import normals_and_areas
 

@@ -16,7 +16,7 @@ from clamp3d.engine.broad import Boxes, box_gaps
 from clamp3d.engine.closed_form import bodies_distance
 from clamp3d.engine.facets import rod_of, rods_distance
 from clamp3d.engine.mesh_distance import meshes_distance
-from clamp3d.engine.model import Forms, Model
+from clamp3d.engine.model import CadModel, Forms, Model
 from clamp3d.engine.open_mesh import open_distance
 from clamp3d.errors import SolverError
 from clamp3d.files.open_cascade import TOLERANCE
@@ -64,13 +64,13 @@ def _levels(a: Model, b: Model, T: Array, enough: Enough, cad_forms: bool) -> It
     if not (a.is_simple and b.is_simple):
         yield "meshes", open_distance(a, b, T)
         return
-    if cad_forms or a.exact is None or b.exact is None:
+    if cad_forms or not (isinstance(a, CadModel) and isinstance(b, CadModel)):
         yield from _by_closed_forms(a, b, T, enough)
         if _is_round(b) and not a.bracketed and a.chords:
             yield "facets", rods_distance(a.outer(a.chords[-1]), b.bodies or (), T)
         if _is_round(a) and not b.bracketed and b.chords:
             yield "facets", rods_distance(b.outer(b.chords[-1]), a.bodies or (), inverse(T)).moved(T).swapped()
-    if a.exact is not None and b.exact is not None:
+    if isinstance(a, CadModel) and isinstance(b, CadModel):
         from clamp3d.engine.cad_pair import CadPair
 
         closed_forms = iter(()) if cad_forms else _by_closed_forms(a, b, T, enough)
@@ -90,8 +90,6 @@ def _chords(a: Model, b: Model) -> list[float]:
     if not (a.chords and b.chords):
         return []
     every = sorted({*a.chords, *b.chords}, reverse=True)
-    if not (a.refines or b.refines):
-        return every[-1:]
     coarsest, finest = min(a.chords[0], b.chords[0]), min(a.chords[-1], b.chords[-1])
     fixed = max((model.outer(coarsest).error for model in (a, b) if not model.refines), default=0.0)
     chords = [chord for chord in every if finest <= chord <= coarsest]
@@ -135,7 +133,7 @@ def _nearest_forms(a: Forms, b: Forms, T: Array, enough: Enough) -> Distance:
 
 def accuracy_for(a: Model, b: Model, accuracy: float = ACCURACY) -> float:
     """``accuracy`` (mm), or what is relative to the size of two shapes or Open CASCADE's, whichever is more."""
-    if a.exact is not None and b.exact is not None:
+    if isinstance(a, CadModel) and isinstance(b, CadModel):
         accuracy = max(accuracy, 2.1 * TOLERANCE)
     return max(accuracy, ACCURACY * 1e-3 * float(max(np.abs(a.bounds).max(), np.abs(b.bounds).max())))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from clamp3d.engine.answer import Distance, Enough
-from clamp3d.engine.model import Model
+from clamp3d.engine.model import CadModel
 from clamp3d.files.faces import PLANE
 from clamp3d.files.open_cascade import TOLERANCE
 from clamp3d.geometry.mesh import IntArray
@@ -24,7 +24,7 @@ _HIGHEST = 8
 """Corners of a body that are looked at to see that they are outside of the other one."""
 
 
-def slab_distance(a: Model, b: Model, T: Array, enough: Enough) -> Distance | None:
+def slab_distance(a: CadModel, b: CadModel, T: Array, enough: Enough) -> Distance | None:
     """Lower bound of the distance of ``b`` at ``T`` (4, 4) in a's frame; None where none is found that is ``enough``.
 
     Of an overlap it is that of the interference: the greatest depth of a point of one body in the other.
@@ -36,7 +36,7 @@ def slab_distance(a: Model, b: Model, T: Array, enough: Enough) -> Distance | No
     return None
 
 
-def _height_over(flat: Model, other: Model, T: Array, enough: Enough) -> float:
+def _height_over(flat: CadModel, other: CadModel, T: Array, enough: Enough) -> float:
     """How far (mm) ``other`` at ``T`` (4, 4) is at least over the flat face that it stands on; -inf if unknown."""
     mesh, others = (model.outer(model.chords[0]) for model in (flat, other))
     points = to_target(T, others.vertices)
@@ -52,14 +52,12 @@ def _height_over(flat: Model, other: Model, T: Array, enough: Enough) -> float:
     return float(normal @ T[:3, 3]) - _height_of(other, -normal @ T[:3, :3], every) - height
 
 
-def _stood_on(flat: Model, near: IntArray, points: Array, enough: Enough) -> Array | None:
+def _stood_on(flat: CadModel, near: IntArray, points: Array, enough: Enough) -> Array | None:
     """The normal (3,) of that flat face of triangles ``near`` (k,) which corners (n, 3) of a body are highest over.
 
     None if it cannot be ``enough`` how high that is.
     """
-    assert flat.exact is not None
-    assert flat.face_meshes is not None
-    form, faces = flat.exact.surfaces, np.unique(flat.face_meshes.face[near])
+    form, faces = flat.shape.surfaces, np.unique(flat.face_meshes.face[near])
     faces = faces[form.kind[faces] == PLANE]
     if not len(faces):
         return None
@@ -69,10 +67,8 @@ def _stood_on(flat: Model, near: IntArray, points: Array, enough: Enough) -> Arr
     return np.asarray(normals[heights.argmax()]) if enough(Distance(best, max(0.0, best))) else None
 
 
-def _height_of(model: Model, direction: Array, rows: IntArray) -> float:
+def _height_of(model: CadModel, direction: Array, rows: IntArray) -> float:
     """How high (mm) what ``rows`` (k,) of a solid's coarse triangles stand for reaches along a unit vector (3,)."""
-    assert model.exact is not None
-    assert model.face_meshes is not None
     mesh, face = model.face_meshes.surface, model.face_meshes.face[rows]
     corners = (mesh.vertices @ direction)[mesh.faces[rows]].max(axis=1)
     reached, at_most = float(corners.max()), corners + mesh.face_errors[rows]
@@ -80,5 +76,5 @@ def _height_of(model: Model, direction: Array, rows: IntArray) -> float:
     if not higher.any():
         return reached
     faces, row = np.unique(face[higher], return_inverse=True)
-    tops = model.exact.tops(direction, faces)[row.reshape(-1)]
+    tops = model.shape.tops(direction, faces)[row.reshape(-1)]
     return max(reached, float(np.minimum(at_most[higher], tops).max()))

@@ -166,12 +166,9 @@ class Surface:
         if not len(rows):
             return np.asarray(inside)
         near = np.ascontiguousarray(points[rows], dtype=np.float64)
-        behind, is_certain, away = self._behind_nearest(near)
-        is_far = self.has_sides & (away > _FAR * self.scale)
-        for rounded in (False, True):
-            some = ~is_certain & (is_far == rounded)
-            turns = winding_numbers(self.vertices, self.faces, near[some], rounded=rounded)
-            behind[some] = np.abs(turns) > 0.5
+        behind, is_certain = self._behind_nearest(near)
+        turns = winding_numbers(self.vertices, self.faces, near[~is_certain])
+        behind[~is_certain] = np.abs(turns) > 0.5
         inside[rows] = behind
         return np.asarray(inside)
 
@@ -183,12 +180,12 @@ class Surface:
         away = points[self.distance(points) > slack]
         return bool(len(away)) and not self.contains(away).all()
 
-    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array]:
-        """Whether points (k, 3) are behind the triangle nearest to them, and nearest to its middle; how far from it."""
-        distance, face, foot = self.nearest(points)
+    def _behind_nearest(self, points: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether points (k, 3) are behind the triangle nearest to them, and nearest to its middle."""
+        _, face, foot = self.nearest(points)
         away = np.einsum("ki,ki->k", points - foot, self.normals[face])
         is_certain = self.has_sides & self._is_in_middle(face, foot) & (np.abs(away) > 1e-9 * self.scale)
-        return away < 0.0, np.asarray(is_certain), distance
+        return away < 0.0, np.asarray(is_certain)
 
     def _is_in_middle(self, face: NDArray[np.int64], points: Array) -> NDArray[np.bool_]:
         """Which of points (k, 3) on triangles ``face`` (k,) are well within these, and on no other triangle's edge."""
@@ -210,7 +207,7 @@ class Surface:
     def is_outside(self, triangles: Array) -> NDArray[np.bool_]:
         """Which of triangles (m, 3, 3) certainly have no point in common with the closed body."""
         outside = ~self.may_meet(triangles)
-        behind, is_certain, _ = self._behind_nearest(triangles[outside].mean(axis=1))
+        behind, is_certain = self._behind_nearest(triangles[outside].mean(axis=1))
         outside[outside] = is_certain & ~behind
         return outside
 
@@ -364,8 +361,6 @@ _CONTACTS = 100
 """Contacts of each triangle that FCL lists at most, so that its answer does not fill the memory."""
 _MIDDLE = 1e-4
 """How far from a triangle's sides, relative to these, a nearest point counts as in its middle."""
-_FAR = 1e-4
-"""Distance from the surface, relative to its size, at which single precision tells inside from outside."""
 
 
 def _nearest_tree(vertices: Array, faces: NDArray[np.int64]) -> Any:
@@ -414,6 +409,11 @@ def fcl_pair(a: Any, b: Any, T: Array) -> tuple[Any, Any]:
     import fcl
 
     return fcl.CollisionObject(a, fcl.Transform()), fcl.CollisionObject(b, fcl.Transform(T[:3, :3], T[:3, 3]))
+
+
+def rounding_of(a: Surface, b: Surface, T: Array) -> float:
+    """What the distance of two meshes may be off by, mm: manifold3d merges vertices within 1e-12 of the size."""
+    return 4e-12 * (a.scale + b.scale + float(np.abs(T[:3, 3]).max()))
 
 
 def tree_distance(a: Any, b: Any, T: Array) -> float:

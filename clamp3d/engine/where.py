@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clamp3d.engine.model import QUICK_TRIANGLES, MeshModel, Model, box_corners
+from clamp3d.engine.model import QUICK_TRIANGLES, CadModel, MeshModel, Model, box_corners
 from clamp3d.engine.overlap import Common, common, deepest
 from clamp3d.engine.surface import Surface
 from clamp3d.errors import Clamp3dError
@@ -111,7 +111,7 @@ class Locator:
         exact = self._exact()
         yield self._at(chords[0], exact)
         yield exact
-        solids = [] if self.thorough else [model for model in models if model.exact is not None]
+        solids = [] if self.thorough else [model for model in models if isinstance(model, CadModel)]
         is_large = sum(solid.fine_triangles for solid in solids) > QUICK_TRIANGLES
         finest = max(solid.fine_chord for solid in solids) if is_large else 0.0
         for chord in sorted({max(chord, finest) for chord in chords[1:]}, reverse=True):
@@ -173,10 +173,10 @@ class Locator:
 
     def _exact(self) -> Overlap | None:
         """From Open CASCADE, for two solids from CAD; None for others, and where it fails."""
-        if self.a.exact is None or self.b.exact is None:
+        if not (isinstance(self.a, CadModel) and isinstance(self.b, CadModel)):
             return None
         try:
-            shared = cad_process.common(self.a.exact.brep, self.b.exact.brep, self.T_ab)
+            shared = cad_process.common(self.a.shape.brep, self.b.shape.brep, self.T_ab)
         except Clamp3dError:
             return None
         if not shared.volume > 0.0:

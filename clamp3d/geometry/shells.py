@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clamp3d.geometry.pose import Array
-from clamp3d.geometry.triangles import normals_and_areas
 
 Faces = NDArray[np.int64]
 
@@ -15,11 +14,6 @@ _FLAT = 1e-14
 
 _MOST_SAMPLES = 64
 """Corners of a surface that are looked at to tell whether it lies in another."""
-
-_SLENDER = 50.0
-"""Slender are triangles of length L and width w with L^2 / w beyond this times the size of their mesh: in single
-precision the winding number of one was up to 3.6 off, 1e-4 of the size away, and that of all others 1e-3.
-"""
 
 _FEW = 8
 """Points up to which the sum over all triangles for each is quicker than to build a tree of them first."""
@@ -63,11 +57,8 @@ def shells(faces: Faces) -> list[NDArray[np.intp]]:
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def winding_numbers(vertices: Array, faces: Faces, points: Array, *, rounded: bool = False) -> Array:
+def winding_numbers(vertices: Array, faces: Faces, points: Array) -> Array:
     """How often (k,) a surface winds round points (k, 3) that are not on it: 1 inside of a closed one, 0 outside.
-
-    ``rounded``: within about 0.01 and ten times as fast (Barill et al. 2018), but for slender triangles in single
-    precision, which is too coarse for points that are nearer to the surface than 1e-4 of its size.
 
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -78,16 +69,7 @@ def winding_numbers(vertices: Array, faces: Faces, points: Array, *, rounded: bo
 
     if len(points) <= _FEW:
         return np.array([igl.winding_number(vertices, faces, point) for point in points])
-    points, quick = np.ascontiguousarray(points), np.zeros(len(faces), dtype=bool)
-    if rounded:
-        corners = vertices[faces]
-        square = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2).max(axis=1)
-        quick = square**1.5 <= _SLENDER * float(np.abs(vertices).max()) * 2.0 * normals_and_areas(corners)[1]
-    turns = np.zeros(len(points))
-    for rows, numbers in ((quick, igl.fast_winding_number), (~quick, igl.winding_number)):
-        if rows.any():
-            turns += numbers(vertices, np.ascontiguousarray(faces[rows]), points)
-    return turns
+    return np.asarray(igl.winding_number(vertices, faces, np.ascontiguousarray(points)))
 
 
 def sampled(corners: Array) -> Array:

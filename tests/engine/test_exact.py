@@ -84,7 +84,7 @@ def test_the_interference_of_a_part_too_thick_for_its_seat_is_bounded_besides_it
     """By meshes where Open CASCADE finds no common part, as is the volume; their sections are not asked here."""
     a, b = models(family, -0.04)
     monkeypatch.setattr(depth_module, "coaxial_distance", lambda *_: None)
-    volume = cad_process.common(a.exact.brep, b.exact.brep, np.eye(4)).volume
+    volume = cad_process.common(a.shape.brep, b.shape.brep, np.eye(4)).volume
     for found in (True, False):
         if not found:
             monkeypatch.setattr(cad_process, "common", lambda *_: CommonPart(0.0, 0.0, np.zeros((2, 3))))
@@ -246,7 +246,7 @@ def test_a_solid_of_planes_and_cylinders_has_a_closed_form_without_an_error():
 
 def test_where_open_cascade_misses_a_common_part_or_some_of_it_nothing_is_known(monkeypatch):
     ball, cone = models("ball_in_cone", -0.005)  # it does miss this one in some poses
-    shared = cad_process.common(ball.exact.brep, cone.exact.brep, np.eye(4), 0.04)
+    shared = cad_process.common(ball.shape.brep, cone.shape.brep, np.eye(4), 0.04)
     for part, attested in ((CommonPart(0.0, 0.0, np.zeros((2, 3))), 0.0), (shared, 0.02)):
         for name in ("common", "quick_common"):
             monkeypatch.setattr(cad_process, name, lambda *_, part=part: part)
@@ -273,16 +273,16 @@ def test_what_is_measured_does_not_depend_on_meshes_that_were_made_before(spline
 def test_no_point_of_a_border_is_deeper_than_the_other_side_of_it_is_far(family, order):
     a, b = models(family, -0.06)[::order]
     T = random_pose(np.random.default_rng(1))
-    turned = to_bytes(moved(from_bytes(b.exact.brep), np.linalg.inv(T)))
-    part = cad_process.common(a.exact.brep, turned, T, 0.5)
+    turned = to_bytes(moved(from_bytes(b.shape.brep), np.linalg.inv(T)))
+    part = cad_process.common(a.shape.brep, turned, T, 0.5)
     for model, border in zip((a, b), part.borders, strict=True):
         middles = border.points[border.triangles].mean(axis=1)[::9]
-        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= border.errors.max()
+        assert np.abs(cad_process.depths(model.shape.brep, middles)).max() <= border.errors.max()
     # The depth of one in the other.
     for model, border, other in zip((b, a), part.borders, part.borders[::-1], strict=True):
         at_most = farthest([_measured(border, other)], lambda *_: False, 1000)
         middles = border.points[border.triangles].mean(axis=1)[::9]
-        assert np.abs(cad_process.depths(model.exact.brep, middles)).max() <= at_most
+        assert np.abs(cad_process.depths(model.shape.brep, middles)).max() <= at_most
 
 
 @pytest.mark.parametrize(("share", "most"), [(0.04, 0.012), (0.015, 0.0085), (0.004, 0.007)])
@@ -290,7 +290,7 @@ def test_between_the_corners_of_its_triangles_a_border_may_be_deepest(share, mos
     """The overlap of two plates drilled alike: on the border of every face both plates end, by the walls of a hole."""
     a, b = models("plates_drilled_alike", -0.006)
     for T in (np.eye(4), random_pose(np.random.default_rng(1))):
-        turned = cad_model(moved(from_bytes(b.exact.brep), np.linalg.inv(T)))
+        turned = cad_model(moved(from_bytes(b.shape.brep), np.linalg.inv(T)))
         distance = exact_overlap(a, turned, T, share)
         assert -most <= distance.lower <= -0.006 <= distance.upper <= -0.00599
 
@@ -434,7 +434,7 @@ def test_fine_triangles_that_do_not_close_are_not_taken(monkeypatch):
 
 def test_a_common_part_beside_the_solids_widens_the_bounds(monkeypatch):
     a, b = models("boxes_face_to_face", -0.06)
-    part = cad_process.common(a.exact.brep, b.exact.brep, np.eye(4), 0.04)
+    part = cad_process.common(a.shape.brep, b.shape.brep, np.eye(4), 0.04)
     sides = tuple(replace(side, points=side.points + 500.0) for side in part.borders)
     moved = replace(part, borders=sides)
     monkeypatch.setattr(cad_process, "common", lambda *_: moved)
@@ -480,7 +480,7 @@ def test_a_ball_of_splines_is_the_duplicate_of_the_ball():
 
 def test_a_common_part_leaves_the_solids_as_they_were():
     """Open CASCADE widens the tolerances of what it is given, and makes coarse triangles of that."""
-    ball, cone = (model.exact.brep for model in models("ball_in_cone", -0.005))
+    ball, cone = (model.shape.brep for model in models("ball_in_cone", -0.005))
     before = [len(cad_process.tessellate(brep, 0.0025).faces) for brep in (ball, cone)]
     cad_process.common(ball, cone, np.eye(4))
     assert [len(cad_process.tessellate(brep, 0.0025).faces) for brep in (ball, cone)] == before

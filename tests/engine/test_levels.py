@@ -23,7 +23,7 @@ from clamp3d.engine.mesh_distance import (
     surfaces_meet,
 )
 from clamp3d.engine.model import ModelCache
-from clamp3d.engine.near_faces import FaceMeshes, near_faces
+from clamp3d.engine.near_faces import FaceMeshes, faces_nearby, near_faces
 from clamp3d.engine.surface import SMOOTH, Surface, at_edges, fcl_pair, fcl_tree
 from clamp3d.geometry.extrusion import Extrusion
 from clamp3d.geometry.pose import inverse, rotation, to_target, translation
@@ -81,7 +81,21 @@ def test_the_faces_that_can_be_the_nearest_are_those_whose_triangles_are():
         assert meeting <= set(chosen.tolist()) < set(every)
         assert meeting
     assert near_faces(a, FaceMeshes(a.surface, 0 * a.face), T) is None  # there are few
-    assert near_faces(a, None, T) is None
+
+
+def test_rounding_leaves_no_solid_without_a_nearest_face():
+    """Of polyhedra without an error the nearest faces are as far apart as the whole, which is rounded otherwise."""
+    bodies = [trimesh.creation.cylinder(5.0, 9.0, sections=n) for n in (17, 23)]
+    a, b = (FaceMeshes(Surface(m.vertices, m.faces, np.zeros(len(m.faces))), np.arange(len(m.faces))) for m in bodies)
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        T = translation(*rng.uniform(9.0, 40.0, 3)) @ rotation(rng.normal(size=3), 2.0)
+        gap = nearest_points(a.surface, b.surface, T)[1]
+        chosen = faces_nearby(a, b, T)
+        on_a, on_b = (
+            Surface(one.surface.vertices, one.surface.faces[faces]) for one, faces in zip((a, b), chosen, strict=True)
+        )
+        assert nearest_points(on_a, on_b, T)[1] == pytest.approx(gap, abs=1e-9)
 
 
 @pytest.mark.parametrize(

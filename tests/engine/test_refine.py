@@ -4,6 +4,7 @@ import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from clamp3d import Distance, shapes
 from clamp3d.engine import cad_pair, refine
 from clamp3d.engine.closed_form import ClosedForm, bodies_distance
 from clamp3d.engine.hull import hull
-from clamp3d.engine.model import ModelCache
+from clamp3d.engine.model import CadModel, ModelCache
 from clamp3d.errors import SolverError
 from clamp3d.geometry.pose import rotation, translation
 
@@ -55,8 +56,13 @@ def test_the_nearest_two_of_many_bodies_are_those_of_all_pairs():
     assert 2 < overlaps < 20
 
 
+def solid(**answers):
+    """A solid from CAD that has these answers, and no others."""
+    return Mock(spec=CadModel, **answers)
+
+
 def test_what_counts_as_known():
-    cad, small, large = (SimpleNamespace(exact=e, bounds=np.array(x)) for e, x in ((1, 1.0), (None, 1.0), (None, -5e4)))
+    cad, (small, large) = solid(bounds=np.array(1.0)), (SimpleNamespace(bounds=np.array(x)) for x in (1.0, -5e4))
     assert refine.accuracy_for(cad, cad) == pytest.approx(2.1e-6)
     assert refine.accuracy_for(cad, cad, 1e-3) == refine.accuracy_for(cad, small, 1e-3) == 1e-3
     assert refine.accuracy_for(cad, small) == refine.accuracy_for(small, small) == 1e-7
@@ -122,8 +128,7 @@ def test_the_levels_of_two_solids_from_cad_in_their_order(cad_levels, monkeypatc
         ([(), (0.1,)], 7_500, "whole 0.0018 100000 whole 0.0018"),
     ):
         a, b = (
-            SimpleNamespace(
-                exact=1,
+            solid(
                 is_simple=True,
                 chords=some,
                 face_meshes=k,
@@ -174,8 +179,7 @@ def test_a_distance_that_meshes_or_points_contradict_bounds_nothing_from_below(
         exact_distance=lambda *_: Distance(5.0, 5.0, method="distance"),
         faces_nearby=lambda *_: ([], []),
     )
-    solid = SimpleNamespace(
-        exact=1,
+    one = solid(
         is_simple=True,
         chords=(0.1,),
         face_meshes=1,
@@ -183,7 +187,7 @@ def test_a_distance_that_meshes_or_points_contradict_bounds_nothing_from_below(
         fine_triangles_near=lambda _: 10_000,
         outer_near=lambda *_: None,
     )
-    answers = cad_pair.CadPair(solid, solid, np.eye(4), lambda _: False).levels(iter(()))
+    answers = cad_pair.CadPair(one, one, np.eye(4), lambda _: False).levels(iter(()))
     (distance,) = itertools.islice((answer for _, answer in answers if answer.method == "distance"), 1)
     assert (distance.lower, distance.upper) == (lower, 5.0)
 
@@ -194,7 +198,7 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
     cad_levels(exact_overlap=lambda a, b, T, share, **_: Distance(method=f"{share}"))
 
-    a = SimpleNamespace(exact=1, is_simple=True, chords=(), quick_bodies=None, outer=fails)
+    a = solid(is_simple=True, chords=(), quick_bodies=None, outer=fails)
     answers = [answer for _, answer in refine._levels(a, a, np.eye(4), lambda _: False, False)]
     assert [answer.method for answer in answers[:3]] == ["probe", "0.04", "0.04"]
     assert len(answers) == 4
@@ -203,12 +207,9 @@ def test_a_common_part_that_is_not_found_is_not_looked_for_more_finely_and_meshe
 
 def test_closed_forms_of_solids_from_cad_are_made_when_they_are_asked_for(cad_levels):
     made = []
-
-    class Formed(SimpleNamespace):
-        quick_bodies = property(made.append)
-
     cad_levels(exact_overlap=lambda *_, **__: Distance(-5.0, method="common part"))
-    a = Formed(exact=1, is_simple=True, chords=())
+    a = solid(is_simple=True, chords=())
+    type(a).quick_bodies = property(made.append)  # the class is its own
     answers = refine._levels(a, a, np.eye(4), lambda _: False, False)
     before = [next(answers)[1].method for _ in range(4)]
     assert (before, made) == (["probe", *["common part"] * 3], [])

@@ -113,7 +113,7 @@ def test_extents_of_splines_are_not_believed(monkeypatch):
     bounds = cad_process.face_bounds_at
     monkeypatch.setattr(cad_process, "face_bounds_at", lambda *given: bounds(*given) - 0.05)
     spline = next(x for x in (a, b) if x.is_free_form)
-    kind = spline.exact.surfaces.kind
-    tops = spline.exact.tops(np.array([0.0, 0.0, 1.0]), np.arange(len(kind)))
+    kind = spline.shape.surfaces.kind
+    tops = spline.shape.tops(np.array([0.0, 0.0, 1.0]), np.arange(len(kind)))
     assert np.isinf(tops[kind == OTHER]).all()
     assert np.isfinite(tops[kind != OTHER]).all()
