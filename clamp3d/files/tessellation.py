@@ -108,7 +108,7 @@ def _meshed(
 ) -> tuple[list[Any], list[tuple[Array, IntArray, Array]], list[Array]]:
     """The faces of a solid, with what `_meshes` says of them.
 
-    Of some cones with an edge all round Open CASCADE makes no triangles (its issue 572), but of these as turned lines,
+    Of some cones with an edge all round Open CASCADE makes no triangles (OCCT issue 572), but of these as turned lines,
     which have the same parameters.
     """
     faces = [*explore(solid, "FACE")]
