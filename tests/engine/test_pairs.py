@@ -81,6 +81,10 @@ def test_thresholds():
     assert {d: t.verdict(Distance(d, d)).value for d in cases} == cases
     assert t.verdict(Distance(-0.02, 0.0)) is Verdict.UNCERTAIN
     assert t.verdict(Distance(1.0 - 1e-9, 1.0 + 1e-9)) is Verdict.CLEAR
+    # Contact ends at 0.010001 mm; bounds up to 2e-6 mm apart have the verdict of their middle.
+    assert t.verdict(Distance(0.0100006 - 0.9e-6, 0.0100006 + 0.9e-6)) is Verdict.CONTACT
+    assert t.verdict(Distance(0.0100014 - 0.9e-6, 0.0100014 + 0.9e-6)) is Verdict.CLEARANCE
+    assert t.verdict(Distance(0.0100006 - 1.1e-6, 0.0100006 + 1.1e-6)) is Verdict.UNCERTAIN
     assert t.verdict(Distance(-math.inf, -0.02)) is Verdict.CLASH
 
 
