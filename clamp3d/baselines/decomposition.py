@@ -40,6 +40,15 @@ from clamp3d.geometry.mesh import Mesh, closed_mesh
 from clamp3d.geometry.pose import Array
 
 _RUN = f"{__name__}:run_coacd"
+NORMALISED = 1.6
+"""Largest extent to which CoACD brings a mesh; the thresholds of its papers and examples are on that scale."""
+
+
+def check_threshold(threshold: float) -> float:
+    """The concavity in mm that CoACD may leave. Raises InputError unless it is > 0 and finite."""
+    if not (math.isfinite(threshold) and threshold > 0.0):
+        raise InputError(f"threshold must be > 0, got {threshold}")
+    return threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +77,9 @@ def decompose(
     in time or ends without an answer.
     """
     solid = closed_mesh(vertices, faces, name)
-    if not (math.isfinite(threshold) and threshold > 0.0):
-        raise InputError(f"threshold must be > 0, got {threshold}")
     if not time_limit > 0.0:
         raise InputError(f"time_limit must be > 0 s, got {time_limit}")
-    settings = {"threshold": threshold, "real_metric": True, "seed": 0}
+    settings = {"threshold": check_threshold(threshold), "real_metric": True, "seed": 0}
     kept = _cache_file(solid, settings)
     with suppress(Exception):  # no file; a damaged one can raise anything
         return _decomposition(dict(np.load(kept, allow_pickle=False)), True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from clamp3d.baselines.decomposition import Decomposition, decompose
+from clamp3d.baselines.decomposition import Decomposition, check_threshold, decompose
 from clamp3d.baselines.fcl_shapes import convex
 from clamp3d.baselines.polytopes import PolytopeModel, Polytopes
 from clamp3d.geometry.meshing import mesh
@@ -48,7 +48,8 @@ class Hulls(PolytopeModel):
         progress: bool | None = None,
     ) -> None:
         super().__init__(parts)
-        self.threshold, self.mesh_error, self.time_limit, self.progress = threshold, mesh_error, time_limit, progress
+        self.threshold = check_threshold(threshold)  # now, not when a part is first measured
+        self.mesh_error, self.time_limit, self.progress = mesh_error, time_limit, progress
         self.decompositions: dict[str, Decomposition] = {}
 
     def cut(self, name: str, part: Solid) -> Polytopes:

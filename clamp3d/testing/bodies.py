@@ -14,7 +14,7 @@ from clamp3d.errors import InputError
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.primitives import Capsule, Cylinder, SweptArc
 from clamp3d.geometry.profile import Arc, Profile
-from clamp3d.geometry.shapes import MeshShape, Solid, Sphere, cylinder
+from clamp3d.geometry.shapes import MeshShape, Solid, Sphere
 
 Field = Callable[[Array], Array]
 """Of points (n, 3): <= 0 on the body, > 0 elsewhere, and nowhere steeper than 1. So a point with the value g > 0 is at
@@ -45,8 +45,6 @@ def body(shape: AnyBody) -> Body:
     """The definition of a shape. Raises InputError for what is neither a shape nor a `Body`."""
     if isinstance(shape, Body):
         return shape
-    if isinstance(shape, Cylinder):
-        shape = cylinder(shape.radius, shape.length)
     if isinstance(shape, Solid):
         return Body(_solid(shape), shape.bounds)
     if isinstance(shape, Sphere):
@@ -55,6 +53,12 @@ def body(shape: AnyBody) -> Body:
     if isinstance(shape, MeshShape):
         V = shape.mesh.vertices
         return Body(_mesh(V, shape.mesh.faces), np.array([V.min(axis=0), V.max(axis=0)]))
+    if isinstance(shape, Cylinder):
+        r, half = shape.radius, 0.5 * shape.length
+        corner = np.array([r, r, half])
+        return Body(
+            lambda x: _prism(np.hypot(x[:, 0], x[:, 1]) - r, np.abs(x[:, 2]) - half), np.array([-corner, corner])
+        )
     if isinstance(shape, Capsule):
         r, half = shape.radius, 0.5 * shape.length
         corner, axis = np.array([r, r, half + r]), np.array([0.0, 0.0, half])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from clamp3d.baselines import Hulls
 from clamp3d.baselines.decomposition import cache_dir, decompose
 from clamp3d.bench.compare.scene import grooved_block
 from clamp3d.errors import SolverError
@@ -76,4 +77,5 @@ test_bad_meshes_and_parameters_are_refused = refusals(
     (lambda: decompose(V, F[1:], COARSE), "watertight"),
     (lambda: decompose(V, F, 0.0), "threshold must be > 0, got 0"),
     (lambda: decompose(V, F, math.nan), "threshold must be > 0"),
+    (lambda: Hulls({}, 0.0), "threshold must be > 0, got 0"),
 )

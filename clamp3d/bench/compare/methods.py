@@ -91,7 +91,9 @@ def prepare(method: Method) -> Prepared:
         return _cas()
     settings = _settings(method)
     if method.family == "hulls":  # on CoACD's own scale
-        settings["threshold"] = (method.setting or 0.0) * np.ptp(BLOCK.bounds, axis=0).max() / 1.6
+        from clamp3d.baselines.decomposition import NORMALISED
+
+        settings["threshold"] = (method.setting or 0.0) * np.ptp(BLOCK.bounds, axis=0).max() / NORMALISED
         settings["mesh_error"] = chord_error(math.radians(HULLS_CHORD_DEG)) * (1.0 + 1e-9)
     model = contact_model(method.family, {"P1": BLOCK}, **settings, progress=False)
 
