@@ -26,7 +26,7 @@ from clamp3d.files.open_cascade import (
     volume_of,
     volumes_of,
 )
-from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of
+from clamp3d.files.tessellation import ANGLE, border_sag, covers, sag_factors, triangles_of, turn_cones
 from clamp3d.geometry.mesh import IntArray, appended
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import distances_from_segments, edge_middles, halves, normals_and_areas
@@ -209,7 +209,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     size = float(np.linalg.norm(box[1] - box[0]))
     sag = max(share * volume / max(area, 1e-300), share * size / _SLENDER, TOLERANCE)
     try:
-        meshes = _meshed(shape, sag)
+        meshes = _border_meshes(shape, sag)
     except Clamp3dError:
         return CommonPart(volume, area, box, corners=corners_of(shape))
     boundaries = Boundary(from_bytes(a)), Boundary(moved(from_bytes(b), T))
@@ -234,7 +234,7 @@ def common(a: bytes, b: bytes, T: Array, share: float | None = None) -> CommonPa
     return CommonPart(volume, area, box, tuple(map(_joined, sides)))
 
 
-def _meshed(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
+def _border_meshes(shape: Any, chord: float) -> list[tuple[Array, IntArray, Array]]:
     """The triangles of each face of a TopoDS_Shape, as `triangles_of` gives them.
 
     Their edges are within ``chord`` mm, the inside of faces is coarser: Open CASCADE takes seconds to mesh
@@ -269,7 +269,9 @@ def _common_shape(a: bytes, b: bytes, pose: bytes) -> Any:
     operation = occ.BRepAlgoAPI_Common(parse(a), moved(parse(b), np.frombuffer(pose).reshape(4, 4)))
     if not operation.IsDone():
         raise Clamp3dError("Open CASCADE cannot make the common part of the two solids")
-    return operation.Shape()
+    shape = operation.Shape()
+    turn_cones(explore(shape, "FACE"))
+    return shape
 
 
 def _samples(face: Any, ends: Array, corners: Array, sag: float) -> tuple[Array, IntArray, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clamp3d.errors import Clamp3dError
-from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, form_of, height, points_on, surfaces
+from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import area_of, explore, faces_of, matrix, occ, parse, require_open_cascade
 from clamp3d.geometry.mesh import IntArray, appended, is_closed
 from clamp3d.geometry.pose import Array, to_target
@@ -42,6 +42,8 @@ _PLACES_EACH = 5
 """Places between two knots of a surface that tells no degree."""
 _MOST_PLACES = 20_000
 """About how many places of a spline are looked at besides those of each triangle."""
+_FEW_CURVES = 20
+"""Curved edges up to which a cone is meshed as it is: with 61 of them one took 20 s."""
 _NO_AREA = 1e-9
 """Area (mm^2) up to which a face may have no triangles: even a ball of so little is smaller than a contact."""
 _DIGITS = 9
@@ -81,7 +83,14 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     # A copy: of a solid with triangles Open CASCADE measures distances by their boxes, and leaves out what of a round
     # flat face is beyond them.
     form = surfaces(brep)
-    faces, meshes, overlooked = _meshed(parse(brep), form, chord, near)
+    solid = parse(brep)
+    faces = [*explore(solid, "FACE")]
+    turn_cones(faces)
+    meshes, overlooked = _meshes(solid, faces, form, chord, near)
+    of_cones = ((faces[k], meshes[k][1]) for k in np.flatnonzero(form.kind == CONE).tolist())
+    if torn := [face for face, triangles in of_cones if len(triangles) and not covers(face, triangles)]:
+        turn_cones(torn, curved=True)
+        meshes, overlooked = _meshes(solid, faces, form, chord, near)
     corners, triples, numbers, errors = [], [], [], []
     for k, (face, (points, triangles, uv)) in enumerate(zip(faces, meshes, strict=True)):
         if not len(triangles):
@@ -103,26 +112,41 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
 
-def _meshed(
-    solid: Any, form: Surfaces, chord: float, near: tuple[int, ...] | None
-) -> tuple[list[Any], list[tuple[Array, IntArray, Array]], list[Array]]:
-    """The faces of a solid, with what `_meshes` says of them.
+def turn_cones(faces: Iterable[Any], *, curved: bool = False) -> None:
+    """Make the cones among the faces of a new TopoDS_Shape turned lines, which have the same parameters.
 
-    Of some cones with an edge all round Open CASCADE makes no triangles (OCCT issue 572), but of these as turned lines,
-    which have the same parameters.
+    Of some cones between circles Open CASCADE makes no triangles (OCCT issue 572), of others five times as many as it
+    needs; cones with long curved borders can take it half a minute. Those with a few curved edges are turned only if
+    ``curved``: they get ten times as many triangles then.
     """
-    faces = [*explore(solid, "FACE")]
-    try:
-        return faces, *_meshes(solid, faces, form, chord, near)
-    except Clamp3dError:
-        bare = [face for face in faces if occ.BRep_Tool.Triangulation_s(face, occ.TopLoc_Location()) is None]
-        cones = [face for face in bare if form_of(occ.BRepAdaptor_Surface(face))[0] == CONE]
-        if not cones:
-            raise
-    turned = occ.BRepTools_ReShape()
-    for face in cones:
-        turned.Replace(face, occ.ShapeCustom.ConvertToRevolution_s(face))
-    return _meshed(turned.Apply(solid), form, chord, near)
+    for face in faces:
+        if occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_Cone:
+            count = sum(not _is_plain(edge) for edge in explore(face, "EDGE"))
+            if curved or not 0 < count <= _FEW_CURVES:
+                _turn(face)
+
+
+def _turn(cone: Any) -> None:
+    """Give a face the surface of its cone as a turned line, and its edges their curves on that."""
+    builder, ways = occ.BRep_Builder(), occ.TopAbs_Orientation
+    surface = occ.BRep_Tool.Surface_s(cone, place := occ.TopLoc_Location())
+    axis = occ.GeomAdaptor_Surface(surface).Cone().Position()
+    turned = occ.Geom_SurfaceOfRevolution(surface.UIso(0.0), axis.Axis() if axis.Direct() else axis.Axis().Reversed())
+    for edge in explore(cone, "EDGE"):
+        is_seam, span, curves = occ.BRep_Tool.IsClosed_s(edge, cone), occ.BRepAdaptor_Curve2d(edge, cone), []
+        for way in (ways.TopAbs_REVERSED, ways.TopAbs_FORWARD):  # a seam has a curve for each
+            edge.Orientation(way)
+            curves.append(occ.BRep_Tool.CurveOnSurface_s(edge, surface, place, 0.0, 0.0))
+        back, forth = curves
+        builder.UpdateEdge(edge, forth, *[back] * is_seam, turned, place, occ.BRep_Tool.Tolerance_s(edge))
+        builder.Range(edge, turned, place, span.FirstParameter(), span.LastParameter())
+    builder.UpdateFace(cone, turned, place, occ.BRep_Tool.Tolerance_s(cone))
+
+
+def _is_plain(edge: Any) -> bool:
+    """Whether an edge is straight, a circle or a point."""
+    curve = _curve(edge)
+    return curve is None or bool(curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle)
 
 
 def _meshes(
@@ -156,22 +180,24 @@ def _mesh(shape: Any, faces: dict[int, Any], form: Surfaces, chord: float) -> No
     """
     how = occ.IMeshTools_Parameters()
     how.Deflection, how.Angle = 0.7 * chord, ANGLE
-    straight = [k for k, face in faces.items() if form.kind[k] <= CONE and _is_spline(face)]
+    straight = [k for k, face in faces.items() if form.kind[k] <= CONE and _is_general(face)]
     how.ControlSurfaceDeflection = not straight
     occ.BRepMesh_IncrementalMesh(shape, how)
     if not straight:
         return
     near = {k for k in straight if _deviation(faces[k], form, k, *_triangles(faces[k], k)).max(initial=0.0) <= chord}
     for k, face in faces.items():
-        if k not in near and (form.kind[k] == OTHER or _is_spline(face)):
+        if k not in near and (form.kind[k] == OTHER or _is_general(face)):
             occ.BRepTools.Clean_s(face)
     how.ControlSurfaceDeflection = True
     occ.BRepMesh_IncrementalMesh(shape, how)  # of the faces without triangles
 
 
-def _is_spline(face: Any) -> bool:
-    """Whether the file gives the face as a B-spline, which may be a plain surface."""
-    return bool(occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_BSplineSurface)
+def _is_general(face: Any) -> bool:
+    """Whether a face is a B-spline, which may be a plain surface, or a turned line."""
+    kinds = occ.GeomAbs_SurfaceType
+    general = (kinds.GeomAbs_BSplineSurface, kinds.GeomAbs_SurfaceOfRevolution)
+    return occ.BRepAdaptor_Surface(face).GetType() in general
 
 
 def triangles_of(face: Any, number: int) -> tuple[Array, IntArray, Array]:
@@ -294,8 +320,7 @@ def border_sag(face: Any, points: Array, triangles: IntArray) -> Array:
     for edge, polygon in _border(face):
         if (curve := _curve(edge)) is None:
             continue
-        is_circle = curve.GetType() == occ.GeomAbs_CurveType.GeomAbs_Circle
-        factor, shares = (1.0, _SHARES[1:2]) if is_circle else (SAMPLED, _SHARES)
+        factor, shares = (1.0, _SHARES[1:2]) if _is_plain(edge) else (SAMPLED, _SHARES)
         nodes, at = _nodes(polygon), np.array([polygon.Parameter(i) for i in range(1, polygon.NbNodes() + 1)])
         times = at[:-1, None] + np.diff(at)[:, None] * shares
         places += [curve.Value(t).Coord() for t in times.reshape(-1).tolist()]

@@ -14,6 +14,7 @@ from clamp3d.errors import Clamp3dError
 from clamp3d.files import faces, tessellation
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE, SPHERE, TORUS, height
 from clamp3d.files.open_cascade import explore, from_bytes, occ, to_bytes
+from clamp3d.files.pairs import common, depths
 from clamp3d.files.solid import BrepSolid
 from clamp3d.files.tessellation import _deviation, border_sag, tessellate, triangles_of
 from clamp3d.geometry.mesh import is_closed
@@ -31,6 +32,7 @@ from tests.cad import (
     rod,
     shift,
     turn,
+    volume,
 )
 from tests.files.assemblies import write_step
 from tests.public.placed_pairs import arch, placed_pair
@@ -359,6 +361,89 @@ def test_cones_of_which_open_cascade_makes_no_triangles_are_meshed_as_turned_lin
     assert (off_face(cone_face, middles[on_cone]) <= made.errors[on_cone]).all()
     assert made.errors[on_cone].max() < 0.02
     assert made.errors.max() < (0.2 if is_near else 0.02)
+
+
+def shared(shape, other):
+    return occ.BRepAlgoAPI_Common(shape, other).Shape()
+
+
+def polygon(sides, radius, height):
+    """A prism over a regular polygon, from z = 0 up."""
+    angles = np.arange(sides) * 2.0 * np.pi / sides
+    outline = occ.BRepBuilderAPI_MakePolygon()
+    for x, y in zip(radius * np.cos(angles), radius * np.sin(angles), strict=True):
+        outline.Add(occ.gp_Pnt(x, y, 0.0))
+    outline.Close()
+    face = occ.BRepBuilderAPI_MakeFace(outline.Wire()).Face()
+    return occ.BRepPrimAPI_MakePrism(face, occ.gp_Vec(0.0, 0.0, height)).Shape()
+
+
+def with_torn_cones(monkeypatch):
+    """Has Open CASCADE leave out some triangles of cones, as it does of some with curved borders."""
+    mesh = occ.BRepMesh_IncrementalMesh
+
+    def meshed(shape, how):
+        mesh(shape, how)
+        for face in explore(shape, "FACE"):
+            triangles = occ.BRep_Tool.Triangulation_s(face, occ.TopLoc_Location())
+            if occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_Cone and triangles:
+                triangles.ResizeTriangles(triangles.NbTriangles() // 2, True)
+
+    monkeypatch.setattr(occ, "BRepMesh_IncrementalMesh", meshed, raising=False)
+
+
+CONES_WITH_CURVES = {
+    "socket": cut(block((-5, -5, -5), (5, 5, 5)), shared(polygon(6, 2, 9), cone(0, 3, 0, 2))),
+    "nut": shared(polygon(6, 2, 2), cone(2.6, 1.2, 0, 2)),
+    "drilled": cut(cone(3, 1, 0, 3), moved(rod(0.6, -5, 5), shift(0, 0.4, 1) @ turn((0, 1, 0.2), 1.3))),
+    "many sides": shared(polygon(24, 2, 2), cone(2.1, 1.2, 0, 2)),
+}
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("name", CONES_WITH_CURVES)
+def test_cones_that_open_cascade_meshes_badly_are_meshed_as_turned_lines(name, mirrored, monkeypatch):
+    """Of those with many curved edges it is not even asked: one takes it 20 s."""
+    shape = CONES_WITH_CURVES[name]
+    if mirrored:
+        mirror = occ.gp_Trsf()
+        mirror.SetMirror(occ.gp_Ax2(occ.gp_Pnt(), occ.gp_Dir(1, 2, 3)))
+        shape = occ.BRepBuilderAPI_Transform(shape, mirror, True).Shape()
+    solid = first_solid(shape)
+    brep = to_bytes(solid)
+    if name == "many sides":
+        without_triangles(monkeypatch, occ.GeomAbs_SurfaceType.GeomAbs_Cone)
+    else:
+        with_torn_cones(monkeypatch)
+    made = tessellate(brep, 0.01)
+    assert is_closed(made.faces)
+    corners = made.vertices[made.faces]
+    enclosed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+    assert enclosed == pytest.approx(volume(solid), rel=0.02)
+    (number,) = np.flatnonzero(faces.surfaces(brep).kind == CONE)
+    on_cone = made.face == number
+    face = [*explore(from_bytes(brep), "FACE")][number]
+    rows = np.flatnonzero(on_cone)[:: 1 + on_cone.sum() // 200]
+    assert off_face(face, corners[rows, 0]).max() < 1e-6
+    assert (off_face(face, corners[rows].mean(axis=1)) <= made.errors[rows]).all()
+    assert made.errors.max() < 0.05
+
+
+def test_a_cone_between_circles_gets_no_more_triangles_than_its_neighbours():
+    made = tessellate(to_bytes(first_solid(cone(5, 2, 0, 7))), 0.0018)
+    count = np.bincount(made.face)
+    assert count.max() <= 1.1 * count.sum() / 2.0
+    assert made.errors.max() <= 0.0018
+
+
+def test_a_common_part_with_a_cone_without_triangles_has_a_border(monkeypatch):
+    without_triangles(monkeypatch, occ.GeomAbs_SurfaceType.GeomAbs_Cone)
+    a, b = (to_bytes(first_solid(shape)) for shape in (cone(5, 2, 0, 7), block((-6, -6, -1), (0, 6, 4))))
+    part = common(a, b, np.eye(4), 0.01)
+    assert len(part.borders) == 2
+    for border, brep in zip(part.borders, (a, b), strict=True):
+        assert len(border.triangles)
+        assert np.abs(depths(brep, border.points[:: 1 + len(border.points) // 100])).max() < 1e-6
 
 
 def test_other_faces_without_triangles_are_said(monkeypatch):
