@@ -115,7 +115,7 @@ def penetration(a: Model, b: Model, T: Array, distance: Distance, *, thorough: b
         new = _way_out(a, b, meshes, depth, thorough)
         way = new if way is None or new.lower > way.lower else way
         depth, is_long = -new.upper, _is_long(way, meshes)
-        if -way.lower <= _TIGHT * depth or -way.lower >= _STEADY * meshes.hidden:
+        if -way.lower <= _TIGHT * depth or (not thorough and -way.lower >= _STEADY * meshes.hidden):
             break
     if way is None:
         return replace(distance, lower=-np.inf, interference=(depth, at_most))

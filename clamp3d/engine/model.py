@@ -25,7 +25,7 @@ from clamp3d.files import cad_process
 from clamp3d.files.faces import CONE, CYLINDER, OTHER, PLANE
 from clamp3d.files.solid import CHORD, BrepSolid
 from clamp3d.files.tessellation import COARSE, Tessellation
-from clamp3d.geometry.mesh import IntArray, edges_of, is_closed
+from clamp3d.geometry.mesh import IntArray, edges_of, encloses
 from clamp3d.geometry.meshing import enclosed, enclosing
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.shapes import MeshShape, Shape, Solid, Sphere, cylinder
@@ -261,7 +261,7 @@ class CadModel(Model):
             coarse = self.shape.tessellated(CAD_CHORDS[0])
         except Clamp3dError:
             return ()
-        if not is_closed(coarse.faces):
+        if not encloses(coarse.vertices, coarse.faces):
             return ()
         return CAD_CHORDS if self.fine_triangles <= MOST_FINE else CAD_CHORDS[:1]
 
@@ -351,7 +351,7 @@ class CadModel(Model):
         return self._closed(self.shape.tessellated(chord))
 
     def _closed(self, mesh: Tessellation) -> Surface:
-        if not is_closed(mesh.faces):  # as coarse ones do, or nobody asks for finer ones
+        if not encloses(mesh.vertices, mesh.faces):  # as coarse ones do, or nobody asks for finer ones
             raise Clamp3dError(f"the triangles of {self.name} do not close")
         return Surface(mesh.vertices, mesh.faces, mesh.errors, has_own_errors=True)
 

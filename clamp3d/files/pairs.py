@@ -239,7 +239,7 @@ def _border_meshes(shape: Any, chord: float) -> list[tuple[Array, IntArray, Arra
 
     Their edges are within ``chord`` mm, the inside of faces is coarser: Open CASCADE takes seconds to mesh
     that of slender free-form faces finely, `_samples` does. Of slender plane faces it can leave out nearly all, and
-    does not say so; finer edges help. Raises Clamp3dError where they do not.
+    does not say so; finer edges help, and turned cones. Raises Clamp3dError where they do not.
     """
     how = occ.IMeshTools_Parameters()
     how.Angle = how.AngleInterior = ANGLE
@@ -249,8 +249,10 @@ def _border_meshes(shape: Any, chord: float) -> list[tuple[Array, IntArray, Arra
         occ.BRepMesh_IncrementalMesh(shape, how)
         faces = [*explore(shape, "FACE")]
         meshes = [triangles_of(face, k) for k, face in enumerate(faces)]
-        if all(covers(face, triangles) for face, (_, triangles, _) in zip(faces, meshes, strict=True)):
+        torn = [face for face, (_, triangles, _) in zip(faces, meshes, strict=True) if not covers(face, triangles)]
+        if not torn:
             return meshes
+        turn_cones(torn, curved=True)
     raise Clamp3dError("Open CASCADE leaves out some of a face of the common part of the two solids")
 
 

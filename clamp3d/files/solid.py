@@ -11,7 +11,7 @@ from clamp3d.files import cad_process
 from clamp3d.files.faces import OTHER, Surfaces
 from clamp3d.files.open_cascade import bounds_of, to_bytes
 from clamp3d.files.tessellation import Tessellation
-from clamp3d.geometry.mesh import IntArray, Mesh, is_closed
+from clamp3d.geometry.mesh import IntArray, Mesh, encloses
 from clamp3d.geometry.pose import Array
 from clamp3d.geometry.shapes import MeshShape
 
@@ -85,7 +85,7 @@ class BrepSolid(MeshShape):
     def mesh(self) -> Mesh:
         """Its triangles at `CHORD`."""
         triangles = self.tessellated(CHORD)
-        closed = is_closed(triangles.faces)
+        closed = encloses(triangles.vertices, triangles.faces)
         notes = () if closed else ("the triangles of the solid do not close",)
         rounding = float(np.abs(triangles.vertices).max()) * 2.0**-50
         return Mesh(self.name, triangles.vertices, triangles.faces, closed, rounding, notes)

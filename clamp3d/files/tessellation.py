@@ -12,7 +12,7 @@ import numpy as np
 from clamp3d.errors import Clamp3dError
 from clamp3d.files.faces import CONE, OTHER, Surfaces, distinct_points_on, height, points_on, surfaces
 from clamp3d.files.open_cascade import area_of, explore, faces_of, matrix, occ, parse, require_open_cascade
-from clamp3d.geometry.mesh import IntArray, appended, is_closed
+from clamp3d.geometry.mesh import IntArray, appended, encloses
 from clamp3d.geometry.pose import Array, to_target
 from clamp3d.geometry.triangles import closest_points, distances_from_segments, edge_middles
 
@@ -87,8 +87,8 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     faces = [*explore(solid, "FACE")]
     turn_cones(faces)
     meshes, overlooked = _meshes(solid, faces, form, chord, near)
-    of_cones = ((faces[k], meshes[k][1]) for k in np.flatnonzero(form.kind == CONE).tolist())
-    if torn := [face for face, triangles in of_cones if len(triangles) and not covers(face, triangles)]:
+    cones = ((face, triangles) for face, (_, triangles, _) in zip(faces, meshes, strict=True) if _is_cone(face))
+    if torn := [cone for cone, triangles in cones if len(triangles) and not covers(cone, triangles)]:
         turn_cones(torn, curved=True)
         meshes, overlooked = _meshes(solid, faces, form, chord, near)
     corners, triples, numbers, errors = [], [], [], []
@@ -107,7 +107,9 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     _, first, index = np.unique(points.round(_DIGITS), axis=0, return_index=True, return_inverse=True)
     vertices, F = points[first], index.reshape(-1)[triangles]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    if near is not None and not is_closed(F[whole]):  # faces that are one, in two places, get other points each
+    if near is not None and not encloses(
+        vertices, F[whole]
+    ):  # faces that are one, in two places, get other points each
         return tessellate(brep, chord)
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
@@ -120,10 +122,14 @@ def turn_cones(faces: Iterable[Any], *, curved: bool = False) -> None:
     ``curved``: they get ten times as many triangles then.
     """
     for face in faces:
-        if occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_Cone:
+        if _is_cone(face):
             count = sum(not _is_plain(edge) for edge in explore(face, "EDGE"))
             if curved or not 0 < count <= _FEW_CURVES:
                 _turn(face)
+
+
+def _is_cone(face: Any) -> bool:
+    return bool(occ.BRepAdaptor_Surface(face).GetType() == occ.GeomAbs_SurfaceType.GeomAbs_Cone)
 
 
 def _turn(cone: Any) -> None:

@@ -405,6 +405,11 @@ def is_closed(F: IntArray) -> bool:
     return bool((uses == 2).all() and not balance.any())
 
 
+def encloses(V: Array, F: IntArray) -> bool:
+    """Whether triangles (m, 3) of vertices (n, 3) enclose a volume, which may touch itself along an edge."""
+    return _closure(V, F)[0]
+
+
 def edges_of(F: IntArray, uses: int) -> tuple[IntArray, IntArray, IntArray]:
     """The edges that have ``uses`` of the triangles (m, 3), in the order of their larger ends, then of the smaller.
 

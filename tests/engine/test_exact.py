@@ -417,6 +417,20 @@ def test_what_a_mesh_leaves_out_of_a_face_is_not_overlooked(lost, monkeypatch):
         assert doubled.sum() / 2 == pytest.approx(area)
 
 
+def test_a_solid_that_touches_itself_along_an_edge_is_measured_by_its_meshes():
+    """Two blocks in one shell, with four faces at one edge; it counts as closed, as meshes from files do."""
+    builder, shell = occ.BRep_Builder(), occ.TopoDS_Shell()
+    builder.MakeShell(shell)
+    for shape in (block((0, 0, 0), (4, 4, 4)), block((4, 4, 0), (8, 8, 4))):
+        for face in explore(shape, "FACE"):
+            builder.Add(shell, face)
+    touching = occ.BRepBuilderAPI_MakeSolid(shell).Solid()
+    (row,) = check(cad_scene(touching, block((1, 1, 3.95), (7, 7, 6)))).pairs
+    assert "FCL" in row.distance.method
+    assert row.distance.lower == pytest.approx(-0.05, abs=1e-5)
+    assert row.distance.upper == pytest.approx(-0.05, abs=1e-5)
+
+
 def test_fine_triangles_that_do_not_close_are_not_taken(monkeypatch):
     tessellate = cad_process.tessellate_finely
 
