@@ -153,6 +153,18 @@ def test_corners_of_triangles_are_merged_and_cavities_kept():
     assert len(closed_mesh(np.vstack([4.0 * V, V + 1.0]), np.vstack([F, F[:, ::-1] + 8])).faces) == 24
 
 
+def test_a_fin_and_the_wall_between_two_bodies_enclose_nothing():
+    """Each is a triangle or two that are there twice, once in each direction."""
+    edge = F[0, :2]
+    fin = np.array([[*edge, 8], [*edge[::-1], 8]])
+    made = make_mesh(np.vstack([V, [V.mean(axis=0) + 9.0]]), np.vstack([F, fin]))
+    assert (made.watertight, len(made.faces), made.vertices.max()) == (True, 12, V.max())
+    reflected = V * (-1.0, 1.0, 1.0) + (2.0 * V[:, 0].max(), 0.0, 0.0)
+    made = make_mesh(np.vstack([V, reflected]), np.vstack([F, F[:, ::-1] + 8]))
+    assert (made.watertight, len(made.faces)) == (True, 20)
+    assert volume(made.vertices, made.faces) == pytest.approx(2.0 * volume(V, F))
+
+
 def test_a_void_is_in_the_body_that_holds_all_of_it_and_is_filled_by_those_that_overlap_it():
     """A body fills most of another one's void; and of two bodies that overlap each has a void, which overlap too."""
     box = trimesh.creation.box
