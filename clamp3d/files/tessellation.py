@@ -107,9 +107,8 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     _, first, index = np.unique(points.round(_DIGITS), axis=0, return_index=True, return_inverse=True)
     vertices, F = points[first], index.reshape(-1)[triangles]
     whole = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    if near is not None and not encloses(
-        vertices, F[whole]
-    ):  # faces that are one, in two places, get other points each
+    # Faces that are one, in two places, get other points each.
+    if near is not None and not encloses(vertices, F[whole]):
         return tessellate(brep, chord)
     return Tessellation(vertices, F[whole], np.concatenate(numbers)[whole], np.concatenate(errors)[whole])
 
