@@ -80,9 +80,9 @@ def tessellate(brep: bytes, chord: float, near: tuple[int, ...] | None = None) -
     ``near``: numbers of the faces that are meshed so; all others are within `COARSE`, if the triangles close then.
     Raises Clamp3dError if a face gets no triangles.
     """
+    form = surfaces(brep)
     # A copy: of a solid with triangles Open CASCADE measures distances by their boxes, and leaves out what of a round
     # flat face is beyond them.
-    form = surfaces(brep)
     solid = parse(brep)
     faces = [*explore(solid, "FACE")]
     turn_cones(faces)
@@ -121,10 +121,11 @@ def turn_cones(faces: Iterable[Any], *, curved: bool = False) -> None:
     ``curved``: they get ten times as many triangles then.
     """
     for face in faces:
-        if _is_cone(face):
-            count = sum(not _is_plain(edge) for edge in explore(face, "EDGE"))
-            if curved or not 0 < count <= _FEW_CURVES:
-                _turn(face)
+        if not _is_cone(face):
+            continue
+        curves = sum(not _is_plain(edge) for edge in explore(face, "EDGE"))
+        if curved or not 0 < curves <= _FEW_CURVES:
+            _turn(face)
 
 
 def _is_cone(face: Any) -> bool:
